@@ -1,0 +1,62 @@
+//! Solutions that results are held against.
+//!
+//! Owns closed forms, quadratures and the front limit; each is one file and one line in [`ALL`].
+//! May use the words. It deliberately reads no result: `measure` compares.
+
+use crate::units::Dimension;
+
+/// An argument of a catalogue item.
+#[derive(Debug, Clone, Copy)]
+pub struct Argument {
+    pub name: &'static str,
+    pub dimension: ArgumentDimension,
+    /// Value if the user leaves it out; `None` makes it required.
+    pub default: Option<f64>,
+    /// Range of valid SI values, both ends inclusive.
+    pub range: (f64, f64),
+    pub doc: &'static str,
+}
+
+/// The dimension a slot asks for.
+#[derive(Debug, Clone, Copy)]
+pub enum ArgumentDimension {
+    Fixed(Dimension),
+    /// mol/volume or mass/volume: whichever the species has.
+    Concentration,
+}
+
+/// What a reference predicts, and thereby which output it is compared with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Predicts {
+    /// Mean concentration at a point: `profile` and `map`.
+    Concentration,
+    /// Covariance of the pair at a point: `covariance`.
+    Covariance,
+    /// γ of the pair: `mixing`.
+    Gamma,
+    /// Amount in the domain: `total`.
+    Total,
+}
+
+/// One item of the catalogue.
+#[derive(Clone, Copy)]
+pub struct Item {
+    pub name: &'static str,
+    pub predicts: Predicts,
+    pub arguments: &'static [Argument],
+    /// One line for the language reference.
+    pub summary: &'static str,
+    /// Author, year, equation, DOI.
+    pub source: &'static str,
+    /// Builds the solution from SI arguments in the order of `arguments`; an error is one sentence
+    /// about the arguments.
+    pub build: fn(&[f64]) -> Result<Box<dyn Solution>, String>,
+}
+
+/// A solution ready to be evaluated.
+pub trait Solution: Send + Sync {
+    /// Fills `out[p]` at time `t` (s) and position `positions[axis][p]` (m, frame coordinates);
+    /// `positions` always has three axes, zero where the scene has fewer. For γ and totals there
+    /// is one point, the origin.
+    fn fill(&self, t: f64, positions: [&[f64]; 3], out: &mut [f64]);
+}

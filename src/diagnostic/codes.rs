@@ -1,0 +1,47 @@
+//! Every code a message can carry: one line here, one page under `docs/diagnostics/`, at least one
+//! fixture under `tests/diagnostics/`. A test holds the three against each other.
+
+/// The code of a message, such as `U104`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Code(pub &'static str);
+
+impl std::fmt::Display for Code {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.0)
+    }
+}
+
+/// What the list knows of a code.
+#[derive(Debug, Clone, Copy)]
+pub struct Entry {
+    pub code: Code,
+    pub title: &'static str,
+    /// The page that `lamella explain` prints.
+    pub page: &'static str,
+}
+
+macro_rules! codes {
+    ($($name:ident $title:literal),* $(,)?) => {
+        $(#[doc = $title] pub const $name: Code = Code(stringify!($name));)*
+
+        /// All codes, in the order of their families.
+        pub const ALL: &[Entry] = &[
+            $(Entry {
+                code: $name,
+                title: $title,
+                page: include_str!(concat!("../../docs/diagnostics/", stringify!($name), ".md")),
+            }),*
+        ];
+    };
+}
+
+// Families: S syntax, D names and definitions, U units and dimensions, M the model as a whole,
+// N numerical limits, L left out, F files and settings, R the run.
+codes! {
+    S001 "the text does not fit the grammar here",
+}
+
+/// The entry of a code as a user types it (`u104` and `U104` are the same).
+pub fn find(text: &str) -> Option<&'static Entry> {
+    ALL.iter().find(|entry| entry.code.0.eq_ignore_ascii_case(text))
+}

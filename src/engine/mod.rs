@@ -1,0 +1,2 @@
+//! Plan and seed in, snapshots out. (under construction)
+pub mod snapshot;

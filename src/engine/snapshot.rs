@@ -1,0 +1,53 @@
+//! What the engine hands out: numbers at a time, nothing of files.
+//!
+//! Owns the shapes of observations. May use `plan`. It deliberately knows no Arrow.
+
+/// One observation of one output at one time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Snapshot {
+    /// Index into `plan.outputs`.
+    pub output_idx: usize,
+    /// s
+    pub t: f64,
+    pub values: Values,
+}
+
+/// The values of an observation; columns follow `plan.outputs[output_idx].quantities`.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Values {
+    /// Per quantity a column over the bins (first active axis slowest): mean and its standard error.
+    Binned { mean: Vec<Vec<f64>>, standard_error: Vec<Vec<f64>>, n_particles: Vec<u64> },
+    /// Per pair a column over the bins.
+    Covariance { covariance: Vec<Vec<f64>>, n_particles: Vec<u64> },
+    /// Per species the amount in the domain and outside of open sides, mol or kg (per m², m for
+    /// fewer axes than three).
+    Total { amount: Vec<f64> },
+    /// Per pair.
+    Mixing(Vec<MixingState>),
+    /// Positions per active axis and concentrations per species, in the order of particles.
+    Particles { positions: Vec<Vec<f64>>, concentrations: Vec<Vec<f64>> },
+}
+
+/// M = M_mean + M_cov and γ = M_cov / M_mean of one pair.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MixingState {
+    pub m: f64,
+    pub m_mean: f64,
+    pub m_cov: f64,
+    pub gamma: f64,
+}
+
+/// What a finished run says of itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Outcome {
+    pub n_steps: u64,
+    pub n_particles: u64,
+    /// Per component: |final − initial| / max(|initial|, Σ|values|) of the carried amount.
+    pub mass_defect: Vec<f64>,
+    /// Wall and CPU seconds of the step loop and of everything the engine did.
+    pub loop_wall: f64,
+    pub wall: f64,
+    pub cpu: f64,
+    /// Bytes of particle state.
+    pub state_bytes: u64,
+}

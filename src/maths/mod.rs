@@ -1,0 +1,6 @@
+//! The fixed library of functions: the same bits on every x86-64 machine.
+//!
+//! Owns every transcendental function that the crate calls. May use nothing else of the crate. It
+//! deliberately never calls the system's library (`f64::exp` and friends pick code by CPU).
+
+pub mod scalar;

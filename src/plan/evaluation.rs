@@ -1,0 +1,105 @@
+//! What is computed from the results: references and measures. Apart from the plan, because a run
+//! need not be repeated when only these change.
+//!
+//! Owns their resolved forms. May use `plan`. It deliberately evaluates nothing: `measure` does.
+
+use super::tape::{Binary, Tape, Unary};
+use super::{OutputKind, Quantity};
+use serde::{Deserialize, Serialize};
+
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Evaluation {
+    pub references: Vec<Reference>,
+    pub measures: Vec<Measure>,
+}
+
+/// A solution that results are held against.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Reference {
+    pub name: String,
+    /// The kinds of output that it is compared with; profile and map for a concentration.
+    pub outputs: Vec<OutputKind>,
+    pub target: Quantity,
+    pub solution: Solution,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Solution {
+    /// Inputs of the tape are x, y, z, t.
+    Expression(Tape),
+    /// An item of `catalog::reference` with its SI arguments in order.
+    Catalogue { name: String, arguments: Vec<f64> },
+}
+
+/// A named number computed from results and references.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Measure {
+    pub name: String,
+    pub value: Scalar,
+    /// Restrict fields to bins whose centre lies in `(axis index, low, high)`.
+    pub over: Option<(usize, f64, f64)>,
+    /// Restrict fields to these times; absent means all times of the output.
+    pub times: Option<Vec<f64>>,
+    /// SI unit of the result, for the column.
+    pub unit: String,
+    pub doc: Option<String>,
+}
+
+/// An expression whose value is one number.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Scalar {
+    Number(f64),
+    Fact(Fact),
+    Norm(Norm, Box<Field>),
+    Unary(Unary, Box<Scalar>),
+    Binary(Binary, Box<Scalar>, Box<Scalar>),
+}
+
+/// What a run knows of itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Fact {
+    /// Wall seconds of the engine.
+    WallTime,
+    CpuTime,
+    /// Largest relative mass defect of any component.
+    MassDefect,
+    Particles,
+    Steps,
+}
+
+/// From a field (bins × times, or times) to a number. Sums over space are integrals with the bin
+/// widths; over times they are plain sums (norms) or means (integral, mean).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Norm {
+    /// Σ_t ∫ |f| dx
+    L1,
+    /// (Σ_t ∫ f² dx)^½
+    L2,
+    /// max |f|
+    LInf,
+    /// (mean of f² over bins and times)^½
+    Rmse,
+    /// mean over t of ∫ f dx
+    Integral,
+    /// mean over bins and times
+    Mean,
+    Minimum,
+    Maximum,
+}
+
+/// An expression whose value is a field over the bins and times of one output.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Field {
+    Number(f64),
+    Output(OutputKind, Quantity),
+    /// Index into `Evaluation::references`.
+    Reference(usize),
+    Unary(Unary, Box<Field>),
+    Binary(Binary, Box<Field>, Box<Field>),
+}

@@ -1,0 +1,235 @@
+//! The plan: everything that a run will do, in SI, with nothing undecided and nothing superfluous.
+//!
+//! Owns the plan's types, its lowering from a scenario, the passes, the limits and the hash. May
+//! use the words, the catalogue and `scenario`. It deliberately runs nothing.
+
+pub mod evaluation;
+pub mod tape;
+
+use serde::{Deserialize, Serialize};
+use tape::Tape;
+
+/// Version of everything that decides bytes: stages, formulas, streams. Part of the plan hash.
+pub const NUMERICS_VERSION: u32 = 1;
+
+/// A whole run, frozen. Lengths in m, times in s, concentrations in mol/m³ or kg/m³.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Plan {
+    pub numerics: u32,
+    /// Active axes only: an axis without gradient or flux is left out by a pass.
+    pub axes: Vec<Axis>,
+    pub walk: Walk,
+    pub particles: Particles,
+    /// The species of the scene that some output needs, in the order of the scene.
+    pub species: Vec<Species>,
+    /// The conservative fields that every particle carries; each in every stored zone.
+    pub components: Vec<Component>,
+    pub mixing: Option<Mixing>,
+    pub reactions: Vec<InstantReaction>,
+    pub time: Time,
+    pub outputs: Vec<Output>,
+    /// What one step does, in order.
+    pub stages: Vec<Stage>,
+    pub seed: u64,
+}
+
+/// One active axis of the domain, in the coordinates of the (moving) frame.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Axis {
+    /// 0, 1, 2 for x, y, z of the scene.
+    pub index: usize,
+    pub low: f64,
+    pub high: f64,
+    pub low_side: Side,
+    pub high_side: Side,
+    /// Bins of the averages along this axis (1 if nothing is averaged).
+    pub bins: usize,
+}
+
+/// What happens to a particle at one side of the domain.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Side {
+    /// No flux: specular reflection.
+    Reflect,
+    /// Particles leave and come in at the opposite side. Both sides of an axis or none.
+    Periodic,
+    /// Particles walk on outside; they are counted in totals, not in bins.
+    Open,
+}
+
+/// `X ← X + drift·Δt + B ξ √Δt`, `B Bᵀ = 2 D` (Itô–Euler; exact in law for constant coefficients).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Walk {
+    /// Velocity relative to the frame, one entry per active axis, m/s.
+    pub drift: Vec<f64>,
+    /// Lower triangle of B row by row over the active axes, m/√s: `[b00, b10, b11, b20, b21, b22]`.
+    pub spread: Vec<f64>,
+    pub normals: Normals,
+}
+
+/// How normal numbers are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Normals {
+    /// Box–Muller in 32-bit lanes: radius error 1e-5, largest value about 6.6.
+    Single,
+    /// Box–Muller in 64-bit arithmetic with 53-bit uniforms, for tails.
+    Double,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Particles {
+    pub count: u64,
+    pub placement: Placement,
+    /// Fluid volume of one particle: m, m² or m³ over the axes of the scene (an axis that was left
+    /// out still counts with its length).
+    pub volume: f64,
+}
+
+/// Where particles start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Placement {
+    /// Uniform and independent.
+    Random,
+    /// One axis: particle p uniform in the p-th of `count` equal intervals. More axes: the domain is
+    /// cut into a grid of nearly cubic cells with equal numbers (±1) of uniform particles in each.
+    Stratified,
+    /// Centres of the strata, no randomness.
+    Ordered,
+}
+
+/// A species and how to restore it from what particles carry.
+///
+/// `U_s = constant + Σ_k coefficient_k · component_k` is the concentration as if nothing had
+/// reacted; the reactions then give the concentration itself.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Species {
+    pub name: String,
+    pub constant: f64,
+    /// `(component index, coefficient)`
+    pub terms: Vec<(usize, f64)>,
+    /// True: amount of substance (mol/m³); false: mass (kg/m³).
+    pub is_molar: bool,
+}
+
+/// A field that is carried, transported linearly and conserved.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Component {
+    /// The species that it stands for (its unreacted concentration).
+    pub name: String,
+    /// Initial value; inputs of the tape are x, y, z, t (SI, frame coordinates).
+    pub initial: Tape,
+}
+
+/// Mixing zones by exchange with the mean (MRIEM).
+///
+/// A particle's value is `U = Σ_i η_i W_i`, zones in order; an instant zone has `W = ū(bin)`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Mixing {
+    pub zones: Vec<Zone>,
+    /// True if only instant zones exist: one unmixed carrier per component is stored (weight 0), and
+    /// every value is the bin mean of the carriers.
+    pub is_well_mixed: bool,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Zone {
+    pub name: String,
+    pub fraction: f64,
+    pub rate: ZoneRate,
+    /// Whether every particle stores a value for this zone. Instant zones are stored only when the
+    /// pass that drops them is switched off; the bytes of the outputs do not change.
+    pub is_stored: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ZoneRate {
+    Instant,
+    /// χ in 1/s: `W ← ū + (W − ū) e^{−χΔt/2}`.
+    Finite(f64),
+}
+
+/// An irreversible, complete reaction, applied to the unreacted concentrations when observed:
+/// extent `ξ = min_r U_r/ν_r`, then `C_r = U_r − ν_r ξ`, `C_p = U_p + ν_p ξ`.
+/// Reactant sets of different reactions are disjoint and no product is a reactant.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct InstantReaction {
+    pub name: String,
+    /// `(species index, ν > 0)`
+    pub reactants: Vec<(usize, f64)>,
+    pub products: Vec<(usize, f64)>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Time {
+    pub step: f64,
+    /// Whole steps; the last one is shortened if `duration` is not a multiple.
+    pub n_steps: u64,
+    pub duration: f64,
+}
+
+/// What is observed and when.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Output {
+    pub kind: OutputKind,
+    /// Species indices; pairs (all combinations a ≤ b … as listed) for covariance and mixing.
+    pub quantities: Vec<Quantity>,
+    /// Bins along each active axis for profile, covariance, map, mixing; empty otherwise.
+    pub bins: Vec<usize>,
+    pub times: Vec<f64>,
+    /// Unit of the values as written by the user; `None` is SI.
+    pub unit: Option<OutputUnit>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OutputKind {
+    /// Mean concentration and its standard error per bin along one axis.
+    Profile,
+    /// Covariance of unreacted concentrations of a pair within bins along one axis, times n/(n−1).
+    Covariance,
+    /// Mean concentration per bin over all active axes.
+    Map,
+    /// Amount in the domain: Σ volume · C.
+    Total,
+    /// M = ∫⟨C_a C_b⟩, M_mean = ∫ c̄_a c̄_b, M_cov, γ = M_cov / M_mean, of unreacted concentrations.
+    Mixing,
+    /// Every particle with position and concentrations.
+    Particles,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Quantity {
+    Species(usize),
+    Pair(usize, usize),
+}
+
+/// `value_in_unit = value_SI / factor`
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OutputUnit {
+    pub text: String,
+    pub factor: f64,
+}
+
+/// What the engine does in a step, in the order of the plan. Closed: every match is exhaustive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Stage {
+    /// Relax towards the bin means of the positions reached.
+    Mix,
+    /// Advect and disperse.
+    Move,
+    /// Apply the sides of the domain.
+    Bound,
+    /// Bin index of every particle, sums per bin, means.
+    Average,
+    /// Mix (of the step before), Move, Bound and Average in one pass over memory.
+    FusedStep,
+    /// Outputs due.
+    Observe,
+}

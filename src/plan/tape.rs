@@ -1,0 +1,64 @@
+//! Expressions compiled to straight-line code over blocks of points.
+//!
+//! Owns the tape and its evaluation. May use `maths`. It deliberately has no branches: `if` selects.
+
+use serde::{Deserialize, Serialize};
+
+/// A register: the result of the operation with that index.
+pub type Register = u16;
+
+/// Straight-line program; operation `k` writes register `k`; the last register is the result.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Tape {
+    pub operations: Vec<Operation>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Operation {
+    Constant(f64),
+    /// Input column (positions first, then time; later concentrations).
+    Input(u16),
+    Unary(Unary, Register),
+    Binary(Binary, Register, Register),
+    /// `condition != 0 ? then : otherwise`
+    Select(Register, Register, Register),
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Unary {
+    Negate,
+    Not,
+    Abs,
+    Sqrt,
+    Exp,
+    Ln,
+    Log10,
+    Sin,
+    Cos,
+    Tanh,
+    Erf,
+    Erfc,
+}
+
+/// Comparisons and logic give 1 or 0.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Binary {
+    Add,
+    Subtract,
+    Multiply,
+    Divide,
+    Power,
+    Minimum,
+    Maximum,
+    Less,
+    LessEqual,
+    Greater,
+    GreaterEqual,
+    Equal,
+    NotEqual,
+    And,
+    Or,
+}

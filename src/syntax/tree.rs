@@ -1,0 +1,365 @@
+//! The tree of one `.lam` file: what was written, where, with every comment.
+//!
+//! Owns the shapes; `parse` builds them, `format` prints them. May use `source`.
+//! It deliberately knows no physics: a unit is text here, a species is a name.
+
+use crate::source::{Span, Spanned};
+
+/// A name with its place.
+pub type Name = Spanned<String>;
+/// The inside of a quoted text, escapes resolved, with the place of the whole token.
+pub type Text = Spanned<String>;
+
+/// One parsed file. `tokens` cover the text without a gap, comments and blanks included; the
+/// statements refer to it by spans, so nothing of the text is lost.
+#[derive(Debug, Clone, PartialEq)]
+pub struct File {
+    pub file: crate::source::FileId,
+    pub tokens: Vec<Token>,
+    /// Statements that parsed, in the order of the text. Those that did not have diagnostics.
+    pub statements: Vec<Statement>,
+}
+
+/// A lexical token.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Token {
+    pub kind: TokenKind,
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum TokenKind {
+    /// A run of blanks without a line end.
+    Blank,
+    /// One line end.
+    Newline,
+    /// From `#` to before the line end.
+    Comment,
+    /// A word: letter or `_`, then letters, digits, `_`.
+    Word,
+    /// A number without its unit; `1_000_000`, `1.2e-2`, `3`.
+    Number,
+    /// A quoted text, quotes included.
+    Text,
+    /// Brackets, operators, commas, arrows.
+    Symbol,
+    /// Anything that no rule knows; always reported.
+    Unknown,
+}
+
+/// One statement: from its keyword to before the line end or comment that closes it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Statement {
+    pub span: Span,
+    /// The place of the keyword.
+    pub keyword: Span,
+    pub kind: StatementKind,
+}
+
+/// The statements of edition 1.
+#[derive(Debug, Clone, PartialEq)]
+pub enum StatementKind {
+    /// `lamella 1`
+    Edition(Spanned<u32>),
+    /// `title "…"`
+    Title(Text),
+    /// `cite "…", "…"`
+    Cite(Vec<Text>),
+    /// `seed 42`
+    Seed(Spanned<u64>),
+    /// `let c = 2 m "doc"`
+    Let(Let),
+    /// `param x = 3 d in 1 .. 10 d "doc"`
+    Param(Param),
+    /// `fn f(a, b) = a / (a + b)`
+    Function(Function),
+    /// `species A "doc", B immobile "doc"`
+    Species(Vec<Species>),
+    /// `reaction name: A + 2 B -> C @ instant`
+    Reaction(Reaction),
+    /// `domain line x = 0 m .. 1 m, frame moving v`
+    Domain(Domain),
+    /// `boundary left, right reflect`
+    Boundary(Boundary),
+    /// `flow uniform v`
+    Flow(Flow),
+    /// `dispersion D`; a scalar, a tuple (diagonal) or a tuple of tuples (tensor)
+    Dispersion(Expr),
+    /// `mixing zones { fast: fraction 0.5, rate instant … }`
+    MixingZones(Vec<Zone>),
+    /// `average bins 300` or `average bins 100 x 50`
+    Average(Average),
+    /// `initial A = …, B = …`
+    Initial(Vec<Assignment>),
+    /// `particles fluid 1_000_000 stratified`
+    Particles(Particles),
+    /// `run to 10 d, step 1 h`
+    Run(Run),
+    /// `output profile A, B at t = 1 d, 2 d`
+    Output(Output),
+    /// `reference NAME for TARGET = …` or `reference CATALOGUE(…) for TARGET`
+    Reference(Reference),
+    /// `measure err = l2(profile.A - exact) over x = 0 m .. 1 m at t = 1 d`
+    Measure(Measure),
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Let {
+    pub name: Name,
+    pub value: Expr,
+    pub doc: Option<Text>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Param {
+    pub name: Name,
+    pub value: Expr,
+    pub range: Option<Range>,
+    pub doc: Option<Text>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Function {
+    pub name: Name,
+    pub parameters: Vec<Name>,
+    pub body: Expr,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Species {
+    pub name: Name,
+    /// Words after the name (`immobile`, `mobile`, …), resolved in `scenario`.
+    pub qualifiers: Vec<Name>,
+    pub doc: Option<Text>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reaction {
+    pub name: Option<Name>,
+    pub reactants: Vec<Term>,
+    pub arrow: Spanned<Arrow>,
+    pub products: Vec<Term>,
+    /// What stands after `@`; `instant` is a plain name here.
+    pub rate: Expr,
+}
+
+/// `2 B` in an equation.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Term {
+    /// The coefficient as written; absent means one.
+    pub coefficient: Option<Spanned<String>>,
+    pub species: Name,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Arrow {
+    /// `->`
+    Forward,
+    /// `<->`
+    Both,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Domain {
+    /// `line`, `rect`, `box`
+    pub shape: Name,
+    pub axes: Vec<Axis>,
+    /// The velocity after `frame moving`.
+    pub frame: Option<Expr>,
+}
+
+/// `x = lo .. hi`
+#[derive(Debug, Clone, PartialEq)]
+pub struct Axis {
+    pub name: Name,
+    pub range: Range,
+}
+
+/// `lo .. hi`
+#[derive(Debug, Clone, PartialEq)]
+pub struct Range {
+    pub low: Expr,
+    pub high: Expr,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Boundary {
+    /// `left`, `right`, `bottom`, `top`, `front`, `back`
+    pub sides: Vec<Name>,
+    /// A catalogue name: `reflect`, `open`, `periodic`.
+    pub kind: Name,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Flow {
+    /// A catalogue name: `uniform`.
+    pub kind: Name,
+    pub argument: Option<Expr>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Zone {
+    pub name: Name,
+    /// `fraction e`, `rate e`, in the order written; `rate instant` has the plain name `instant`.
+    pub fields: Vec<Field>,
+}
+
+/// `keyword value`
+#[derive(Debug, Clone, PartialEq)]
+pub struct Field {
+    pub name: Name,
+    pub value: Expr,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Average {
+    /// `bins`
+    pub kind: Name,
+    pub counts: Vec<Spanned<f64>>,
+}
+
+/// `A = …`
+#[derive(Debug, Clone, PartialEq)]
+pub struct Assignment {
+    pub name: Name,
+    pub value: Expr,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Particles {
+    /// `fluid`
+    pub kind: Name,
+    /// A number, or a name of a dimensionless parameter.
+    pub count: Expr,
+    /// A catalogue name: `stratified`, `random`.
+    pub placement: Option<Name>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    pub duration: Expr,
+    pub step: Option<Expr>,
+    /// Further `, word word` settings, such as `normals double`.
+    pub settings: Vec<(Name, Name)>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Output {
+    /// A catalogue name: `profile`, `covariance`, `map`, `total`, `mixing`, `particles`.
+    pub kind: Name,
+    pub species: Vec<Name>,
+    pub times: Option<Times>,
+    /// `along y`
+    pub along: Option<Name>,
+    /// `on 200 x 80`
+    pub grid: Vec<Spanned<f64>>,
+    /// The text after `in`: a unit, as written.
+    pub unit: Option<Spanned<String>>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum Times {
+    /// `at t = a, b, …`
+    List(Vec<Expr>),
+    /// `every e`
+    Every(Expr),
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reference {
+    /// `None` in the form `reference CATALOGUE(…) for TARGET`: the catalogue name is the name.
+    pub name: Option<Name>,
+    pub target: Target,
+    pub value: Expr,
+}
+
+/// What a reference predicts: `AB`, `covariance A, B`, `mixing A, B`, `total AB`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Target {
+    /// An output kind; absent means the concentration.
+    pub output: Option<Name>,
+    pub species: Vec<Name>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measure {
+    pub name: Name,
+    pub value: Expr,
+    /// `over x = lo .. hi`
+    pub over: Option<Axis>,
+    /// `at t = a, b`
+    pub times: Option<Vec<Expr>>,
+    pub doc: Option<Text>,
+}
+
+/// An expression with its place.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Expr {
+    pub span: Span,
+    pub kind: ExprKind,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum ExprKind {
+    /// A number and, by adjacency, its unit.
+    Number(Number),
+    /// A name, or a dotted path such as `profile.A`.
+    Path(Vec<Name>),
+    /// `f(a, b)` or `f(c0 = a, D = b)`.
+    Call {
+        function: Name,
+        arguments: Vec<Argument>,
+    },
+    Unary {
+        operator: Spanned<UnaryOperator>,
+        operand: Box<Expr>,
+    },
+    Binary {
+        operator: Spanned<BinaryOperator>,
+        left: Box<Expr>,
+        right: Box<Expr>,
+    },
+    If {
+        condition: Box<Expr>,
+        then: Box<Expr>,
+        otherwise: Box<Expr>,
+    },
+    /// `(a, b)`; a single expression in brackets is that expression.
+    Tuple(Vec<Expr>),
+}
+
+/// A number as written: the digits (without `_`) and the unit text, both exact.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Number {
+    pub digits: String,
+    pub unit: Option<Spanned<String>>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Argument {
+    pub name: Option<Name>,
+    pub value: Expr,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum UnaryOperator {
+    Negate,
+    Not,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum BinaryOperator {
+    Add,
+    Subtract,
+    Multiply,
+    Divide,
+    Power,
+    Less,
+    LessEqual,
+    Greater,
+    GreaterEqual,
+    Equal,
+    NotEqual,
+    And,
+    Or,
+}
