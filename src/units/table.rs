@@ -93,9 +93,9 @@ pub fn is_unit_symbol(text: &str) -> bool {
 
 /// Symbols that people write, for did-you-mean and the language reference.
 pub fn known_symbols() -> impl Iterator<Item = String> {
-    let common = ["k", "c", "m", "u", "µ", "n", "M"];
-    SYMBOLS.iter().flat_map(move |symbol| {
-        let prefixes = if symbol.takes_prefix { &common[..] } else { &[] };
+    const COMMON: [&str; 7] = ["k", "c", "m", "u", "µ", "n", "M"];
+    SYMBOLS.iter().flat_map(|symbol| {
+        let prefixes = if symbol.takes_prefix { &COMMON[..] } else { &[] };
         std::iter::once(symbol.text.to_owned())
             .chain(prefixes.iter().map(move |prefix| format!("{prefix}{}", symbol.text)))
     })
