@@ -3,4 +3,5 @@
 //! Owns every transcendental function that the crate calls. May use nothing else of the crate. It
 //! deliberately never calls the system's library (`f64::exp` and friends pick code by CPU).
 
+pub mod operator;
 pub mod scalar;

@@ -2,6 +2,7 @@
 //!
 //! Owns the tape and its evaluation. May use `maths`. It deliberately has no branches: `if` selects.
 
+pub use crate::maths::operator::{Binary, Unary};
 use serde::{Deserialize, Serialize};
 
 /// A register: the result of the operation with that index.
@@ -23,42 +24,4 @@ pub enum Operation {
     Binary(Binary, Register, Register),
     /// `condition != 0 ? then : otherwise`
     Select(Register, Register, Register),
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Unary {
-    Negate,
-    Not,
-    Abs,
-    Sqrt,
-    Exp,
-    Ln,
-    Log10,
-    Sin,
-    Cos,
-    Tanh,
-    Erf,
-    Erfc,
-}
-
-/// Comparisons and logic give 1 or 0.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Binary {
-    Add,
-    Subtract,
-    Multiply,
-    Divide,
-    Power,
-    Minimum,
-    Maximum,
-    Less,
-    LessEqual,
-    Greater,
-    GreaterEqual,
-    Equal,
-    NotEqual,
-    And,
-    Or,
 }
