@@ -39,6 +39,11 @@ macro_rules! codes {
 // N numerical limits, L left out, F files and settings, R the run.
 codes! {
     S001 "the text does not fit the grammar here",
+    F101 "a file cannot be read",
+    F102 "a file is not UTF-8 text",
+    F103 "a file or folder cannot be written",
+    F104 "there is no such message code",
+    R101 "the run was interrupted",
 }
 
 /// The entry of a code as a user types it (`u104` and `U104` are the same).
