@@ -4,4 +4,6 @@
 //! deliberately never calls the system's library (`f64::exp` and friends pick code by CPU).
 
 pub mod operator;
+pub mod quadrature;
 pub mod scalar;
+pub mod special;

@@ -3,7 +3,44 @@
 //! Owns closed forms, quadratures and the front limit; each is one file and one line in [`ALL`].
 //! May use the words. It deliberately reads no result: `measure` compares.
 
+mod arguments;
+mod front;
+mod front_covariance;
+mod front_gamma;
+mod gaussian_closure;
+mod gaussian_pulse;
+mod inflow;
+mod pulse_covariance;
+mod pulse_gamma;
+mod solutions;
+mod step_front;
+#[cfg(test)]
+mod tests;
+mod well_mixed;
+
 use crate::units::Dimension;
+
+/// Every reference that a scene can name.
+pub const ALL: &[Item] = &[
+    step_front::ITEM,
+    well_mixed::FRONT,
+    well_mixed::TOTAL,
+    front_covariance::ITEM,
+    front_covariance::MULTIRATE,
+    front_gamma::ITEM,
+    front_gamma::MULTIRATE,
+    gaussian_closure::ITEM,
+    gaussian_pulse::ITEM,
+    pulse_covariance::ITEM,
+    pulse_gamma::ITEM,
+    inflow::OGATA_BANKS,
+    inflow::CAUCHY_INFLOW,
+];
+
+/// The item of that name.
+pub fn find(name: &str) -> Option<&'static Item> {
+    ALL.iter().find(|item| item.name == name)
+}
 
 /// An argument of a catalogue item.
 #[derive(Debug, Clone, Copy)]
@@ -50,8 +87,11 @@ pub struct Item {
     pub source: &'static str,
     /// Builds the solution from SI arguments in the order of `arguments`; an error is one sentence
     /// about the arguments.
-    pub build: fn(&[f64]) -> Result<Box<dyn Solution>, String>,
+    pub build: fn(&[f64]) -> Built,
 }
+
+/// A solution, or one sentence on what is wrong with its arguments.
+pub type Built = Result<Box<dyn Solution>, String>;
 
 /// A solution ready to be evaluated.
 pub trait Solution: Send + Sync {
