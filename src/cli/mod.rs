@@ -7,9 +7,15 @@ mod completions;
 mod explain;
 #[allow(dead_code)]
 mod files;
+#[allow(dead_code)]
+mod interrupt;
 mod new;
 #[allow(dead_code)]
+mod progress;
+#[allow(dead_code)]
 mod terminal;
+#[allow(dead_code)]
+mod text;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use lamella::diagnostic::Diagnostic;

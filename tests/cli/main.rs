@@ -1,0 +1,4 @@
+//! The program, run as a user would: each command, each exit code, each way a file can be wrong.
+
+mod basics;
+mod program;
