@@ -9,4 +9,5 @@ pub mod maths;
 pub mod plan;
 pub mod source;
 pub mod syntax;
+pub mod table;
 pub mod units;

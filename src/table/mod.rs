@@ -1,0 +1,27 @@
+//! From snapshots to Parquet: long tables with units, whole or absent, the same bytes every time.
+//!
+//! Owns the layout of a run's folder, the schemas, the footers and the way files come to be. May
+//! use `plan` and `engine::snapshot`. It deliberately computes nothing: errors and measures are
+//! handed in.
+
+mod bins;
+mod failure;
+mod footer;
+mod lists;
+mod points;
+pub mod read;
+mod record;
+mod rows;
+mod schema;
+mod sheet;
+mod unit;
+mod writer;
+
+pub use bins::{Grid, centre};
+pub use failure::TableError;
+pub use footer::{Footer, KEY as FOOTER_KEY, VERSION as FOOTER_VERSION};
+pub use read::is_complete;
+pub use record::{ErrorRow, Norms, Parameter, PointRow, Record, Status, Swept, SweptValue, Value};
+pub use schema::Kind;
+pub use unit::{ValueUnit, value_unit};
+pub use writer::{Summary, Writer, WrittenFile};

@@ -1,0 +1,253 @@
+//! From a snapshot to rows.
+//!
+//! Owns the order of rows: by quantity, then by bin or particle. May use `plan` and
+//! `engine::snapshot`. It deliberately holds at most one row group at a time.
+
+use super::bins::Grid;
+use super::failure::TableError;
+use super::schema::{self, Kind};
+use super::sheet::{ROW_GROUP, Sheet};
+use super::unit::{ValueUnit, value_unit};
+use crate::engine::snapshot::{MixingState, Snapshot, Values};
+use crate::plan::{Output, Plan, Quantity};
+use arrow_array::types::UInt16Type;
+use arrow_array::{
+    ArrayRef, DictionaryArray, Float64Array, RecordBatch, StringArray, UInt16Array, UInt32Array, UInt64Array,
+};
+use arrow_schema::SchemaRef;
+use std::ops::Range;
+use std::sync::Arc;
+
+/// What is the same for all rows of a table.
+pub struct Layout {
+    kind: Kind,
+    pub schema: SchemaRef,
+    species: ArrayRef,
+    units: ArrayRef,
+    /// Per output of the plan and quantity: place in `units`, factor.
+    unit_keys: Vec<Vec<(u16, f64)>>,
+    /// The unit of the whole table, if there is only one.
+    pub row_unit: Option<String>,
+}
+
+impl Layout {
+    pub fn new(kind: Kind, plan: &Plan, n_axes: usize) -> Self {
+        let mut texts: Vec<String> = Vec::new();
+        let mut key = |unit: ValueUnit| {
+            let place = texts.iter().position(|text| *text == unit.text).unwrap_or_else(|| {
+                texts.push(unit.text.clone());
+                texts.len() - 1
+            });
+            (place as u16, unit.factor)
+        };
+        let mut keys_of = |output: &Output| -> Vec<(u16, f64)> {
+            let is_mine = Kind::from(output.kind) == kind;
+            let mine = output.quantities.iter().filter(|_| is_mine);
+            mine.map(|quantity| key(value_unit(plan, output, *quantity, n_axes))).collect()
+        };
+        let unit_keys: Vec<_> = plan.outputs.iter().map(&mut keys_of).collect();
+        let row_unit = (texts.len() == 1).then(|| texts[0].clone());
+        let names = plan.species.iter().map(|species| species.name.as_str());
+        Self {
+            kind,
+            schema: schema::arrow_schema(&schema::columns(kind), row_unit.as_deref()),
+            species: Arc::new(StringArray::from_iter_values(names)),
+            units: Arc::new(StringArray::from_iter_values(&texts)),
+            unit_keys,
+            row_unit,
+        }
+    }
+}
+
+/// Appends all rows of one snapshot.
+pub fn append(
+    sheet: &mut Sheet,
+    layout: &Layout,
+    plan: &Plan,
+    snapshot: &Snapshot,
+) -> Result<(), TableError> {
+    let output = &plan.outputs[snapshot.output_idx];
+    check_shape(plan, output, snapshot)?;
+    let grid = Grid::new(plan, output);
+    for (quantity_idx, quantity) in output.quantities.iter().enumerate() {
+        let block = Block { layout, plan, grid: &grid, snapshot, quantity_idx, quantity: *quantity };
+        let n = block.n_rows();
+        for start in (0..n).step_by(ROW_GROUP) {
+            sheet.append(&block.batch(start..n.min(start + ROW_GROUP))?)?;
+        }
+    }
+    Ok(())
+}
+
+/// The rows of one quantity at one time.
+struct Block<'a> {
+    layout: &'a Layout,
+    plan: &'a Plan,
+    grid: &'a Grid,
+    snapshot: &'a Snapshot,
+    quantity_idx: usize,
+    quantity: Quantity,
+}
+
+impl Block<'_> {
+    fn n_rows(&self) -> usize {
+        match &self.snapshot.values {
+            Values::Binned { n_particles, .. } | Values::Covariance { n_particles, .. } => n_particles.len(),
+            Values::Total { .. } | Values::Mixing(_) => 1,
+            Values::Particles { concentrations, .. } => concentrations[self.quantity_idx].len(),
+        }
+    }
+
+    /// The columns in the order of the schema.
+    fn batch(&self, rows: Range<usize>) -> Result<RecordBatch, TableError> {
+        let q = self.quantity_idx;
+        let mut columns = self.head(rows.len());
+        match &self.snapshot.values {
+            Values::Binned { mean, standard_error, n_particles } => {
+                columns.extend(self.bin_coordinates(rows.clone()));
+                columns.extend(self.names(rows.len()));
+                columns.push(self.values(&mean[q], rows.clone(), |row| n_particles[row] > 0));
+                columns.push(self.values(&standard_error[q], rows.clone(), |row| n_particles[row] > 1));
+                columns.push(counts(&n_particles[rows.clone()]));
+            }
+            Values::Covariance { covariance, n_particles } => {
+                columns.extend(self.bin_coordinates(rows.clone()));
+                columns.extend(self.names(rows.len()));
+                columns.push(self.values(&covariance[q], rows.clone(), |row| n_particles[row] > 1));
+                columns.push(counts(&n_particles[rows.clone()]));
+            }
+            Values::Total { amount } => {
+                columns.extend(self.names(1));
+                columns.push(self.values(&amount[q..=q], rows.clone(), |_| true));
+            }
+            Values::Mixing(states) => {
+                columns.extend(self.names(1));
+                columns.extend(self.mixing(states[q]));
+            }
+            Values::Particles { positions, concentrations } => {
+                columns.push(Arc::new(UInt64Array::from_iter_values(rows.clone().map(|row| row as u64))));
+                columns.extend(self.particle_coordinates(positions, rows.clone()));
+                columns.extend(self.names(rows.len()));
+                columns.push(self.values(&concentrations[q], rows.clone(), |_| true));
+            }
+        }
+        columns.extend(self.tail(rows.len()));
+        RecordBatch::try_new(self.layout.schema.clone(), columns).map_err(|reason| TableError::Format {
+            file: self.layout.kind.name().into(),
+            reason: reason.to_string(),
+        })
+    }
+
+    fn head(&self, n: usize) -> Vec<ArrayRef> {
+        vec![
+            Arc::new(UInt32Array::from_value(0, n)),
+            Arc::new(UInt32Array::from_value(0, n)),
+            Arc::new(Float64Array::from_value(self.snapshot.t, n)),
+        ]
+    }
+
+    fn tail(&self, n: usize) -> Vec<ArrayRef> {
+        let (unit, _) = self.unit();
+        let output = self.snapshot.output_idx as u16;
+        vec![repeated(&self.layout.units, unit, n), Arc::new(UInt16Array::from_value(output, n))]
+    }
+
+    fn unit(&self) -> (u16, f64) {
+        self.layout.unit_keys[self.snapshot.output_idx][self.quantity_idx]
+    }
+
+    fn names(&self, n: usize) -> Vec<ArrayRef> {
+        let name = |idx: usize| repeated(&self.layout.species, idx as u16, n);
+        match self.quantity {
+            Quantity::Species(s) => vec![name(s)],
+            Quantity::Pair(a, b) => vec![name(a), name(b)],
+        }
+    }
+
+    /// Values in the unit of the output; null where there is nothing, or nothing finite, to tell.
+    fn values(&self, column: &[f64], rows: Range<usize>, is_known: impl Fn(usize) -> bool) -> ArrayRef {
+        let (_, factor) = self.unit();
+        let value = |row: usize| (is_known(row) && column[row].is_finite()).then(|| column[row] / factor);
+        Arc::new(rows.map(value).collect::<Float64Array>())
+    }
+
+    fn mixing(&self, state: MixingState) -> Vec<ArrayRef> {
+        let (_, factor) = self.unit();
+        let cell = |value: f64| -> ArrayRef {
+            Arc::new(Float64Array::from(vec![value.is_finite().then_some(value)]))
+        };
+        vec![
+            cell(state.m / factor),
+            cell(state.m_mean / factor),
+            cell(state.m_cov / factor),
+            cell(state.gamma),
+        ]
+    }
+
+    fn bin_coordinates(&self, rows: Range<usize>) -> Vec<ArrayRef> {
+        let column = |axis: usize| -> ArrayRef {
+            Arc::new(rows.clone().map(|row| self.grid.coordinate(axis, row)).collect::<Float64Array>())
+        };
+        (0..3).map(column).collect()
+    }
+
+    fn particle_coordinates(&self, positions: &[Vec<f64>], rows: Range<usize>) -> Vec<ArrayRef> {
+        let column = |axis: usize| -> ArrayRef {
+            match self.plan.axes.iter().position(|active| active.index == axis) {
+                Some(place) => {
+                    Arc::new(Float64Array::from_iter_values(positions[place][rows.clone()].iter().copied()))
+                }
+                None => Arc::new(Float64Array::new_null(rows.len())),
+            }
+        };
+        (0..3).map(column).collect()
+    }
+}
+
+fn counts(n_particles: &[u64]) -> ArrayRef {
+    Arc::new(UInt64Array::from_iter_values(n_particles.iter().copied()))
+}
+
+/// One word `n` times.
+fn repeated(words: &ArrayRef, key: u16, n: usize) -> ArrayRef {
+    let keys = UInt16Array::from_value(key, n);
+    Arc::new(DictionaryArray::<UInt16Type>::new(keys, words.clone()))
+}
+
+/// Refuses a snapshot whose columns do not fit its output, before any row is written.
+fn check_shape(plan: &Plan, output: &Output, snapshot: &Snapshot) -> Result<(), TableError> {
+    let is = |what: &'static str, expected: usize, found: usize| {
+        if expected == found {
+            return Ok(());
+        }
+        Err(TableError::Shape { output_idx: snapshot.output_idx, what, expected, found })
+    };
+    let all = |what: &'static str, expected: usize, columns: &[Vec<f64>]| {
+        columns.iter().try_for_each(|column| is(what, expected, column.len()))
+    };
+    let n_quantities = output.quantities.len();
+    let n_bins = output.bins.iter().product();
+    match &snapshot.values {
+        Values::Binned { mean, standard_error, n_particles } => {
+            is("quantities", n_quantities, mean.len())?;
+            is("quantities", n_quantities, standard_error.len())?;
+            is("bins", n_bins, n_particles.len())?;
+            all("bins", n_bins, mean)?;
+            all("bins", n_bins, standard_error)
+        }
+        Values::Covariance { covariance, n_particles } => {
+            is("quantities", n_quantities, covariance.len())?;
+            is("bins", n_bins, n_particles.len())?;
+            all("bins", n_bins, covariance)
+        }
+        Values::Total { amount } => is("quantities", n_quantities, amount.len()),
+        Values::Mixing(states) => is("quantities", n_quantities, states.len()),
+        Values::Particles { positions, concentrations } => {
+            is("axes", plan.axes.len(), positions.len())?;
+            is("quantities", n_quantities, concentrations.len())?;
+            let n = concentrations.first().map_or(0, Vec::len);
+            all("particles", n, concentrations)?;
+            all("particles", n, positions)
+        }
+    }
+}

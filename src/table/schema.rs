@@ -1,0 +1,249 @@
+//! The columns of every table: one schema per kind, the same for all scenes.
+//!
+//! Owns names, types and descriptions. May use `units` and `plan`. It deliberately holds no rows.
+
+use super::unit::si_text;
+use crate::plan::OutputKind;
+use crate::units::Dimension;
+use arrow_schema::{DataType, Field, Schema};
+use std::collections::HashMap;
+use std::sync::Arc;
+
+/// A folder of a run, each with one schema.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Kind {
+    Profile,
+    Map,
+    Covariance,
+    Total,
+    Mixing,
+    Particles,
+    Errors,
+}
+
+impl Kind {
+    pub const ALL: [Self; 7] = [
+        Self::Profile,
+        Self::Map,
+        Self::Covariance,
+        Self::Total,
+        Self::Mixing,
+        Self::Particles,
+        Self::Errors,
+    ];
+
+    /// Name of the folder.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Profile => "profile",
+            Self::Map => "map",
+            Self::Covariance => "covariance",
+            Self::Total => "total",
+            Self::Mixing => "mixing",
+            Self::Particles => "particles",
+            Self::Errors => "errors",
+        }
+    }
+}
+
+impl From<OutputKind> for Kind {
+    fn from(kind: OutputKind) -> Self {
+        match kind {
+            OutputKind::Profile => Self::Profile,
+            OutputKind::Map => Self::Map,
+            OutputKind::Covariance => Self::Covariance,
+            OutputKind::Total => Self::Total,
+            OutputKind::Mixing => Self::Mixing,
+            OutputKind::Particles => Self::Particles,
+        }
+    }
+}
+
+/// What a column's numbers are measured in.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Measured {
+    /// Counts, names, keys.
+    Unitless,
+    Fixed(Dimension),
+    /// A unit outside the base units: `byte`.
+    Named(String),
+    /// The unit of the output: one for the table, or row by row in column `unit`.
+    Row,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    pub name: String,
+    pub shape: DataType,
+    pub is_nullable: bool,
+    pub measured: Measured,
+    pub doc: String,
+}
+
+/// What field metadata says where the unit differs between rows.
+pub const BY_ROW: &str = "see column unit";
+
+impl Column {
+    pub fn new(name: &str, shape: DataType, measured: Measured, doc: &str) -> Self {
+        Self { name: name.to_owned(), shape, is_nullable: false, measured, doc: doc.to_owned() }
+    }
+
+    pub fn or_null(mut self) -> Self {
+        self.is_nullable = true;
+        self
+    }
+
+    /// The unit as text, given the table's row unit if there is only one; empty for names and counts.
+    pub fn unit_text(&self, row_unit: Option<&str>) -> String {
+        match &self.measured {
+            Measured::Unitless => String::new(),
+            Measured::Fixed(dimension) => si_text(*dimension),
+            Measured::Named(text) => text.clone(),
+            Measured::Row => row_unit.unwrap_or(BY_ROW).to_owned(),
+        }
+    }
+}
+
+/// Names are stored once and pointed at.
+pub fn word() -> DataType {
+    DataType::Dictionary(Box::new(DataType::UInt16), Box::new(DataType::Utf8))
+}
+
+/// Columns of a table kind, in order.
+pub fn columns(kind: Kind) -> Vec<Column> {
+    let mut columns = head().to_vec();
+    match kind {
+        Kind::Profile | Kind::Map => {
+            columns.extend(coordinates());
+            columns.push(species());
+            columns
+                .push(concentration("mean concentration of the particles in the bin; null if it is empty"));
+            columns.push(row_value(
+                "standard_error",
+                "standard error of the mean over the particles of the bin; null for fewer than two",
+            ));
+            columns.push(n_particles());
+        }
+        Kind::Covariance => {
+            columns.extend(coordinates());
+            columns.extend(pair());
+            columns.push(row_value(
+                "covariance",
+                "covariance of the unreacted concentrations of the particles in the bin, times n/(n-1)",
+            ));
+            columns.push(n_particles());
+        }
+        Kind::Total => {
+            columns.push(species());
+            columns.push(row_value(
+                "amount",
+                "amount in the domain: sum of particle volume times concentration",
+            ));
+        }
+        Kind::Mixing => {
+            columns.extend(pair());
+            columns.push(row_value("m", "integral of the mean product of the unreacted concentrations"));
+            columns.push(row_value("m_mean", "integral of the product of the mean unreacted concentrations"));
+            columns.push(row_value("m_cov", "integral of the covariance of the unreacted concentrations"));
+            columns.push(
+                Column::new("gamma", DataType::Float64, Measured::Fixed(Dimension::NONE), "m_cov / m_mean")
+                    .or_null(),
+            );
+        }
+        Kind::Particles => {
+            columns.push(plain("particle", DataType::UInt64, "number of the particle, from 0"));
+            columns.extend(coordinates());
+            columns.push(species());
+            columns.push(concentration("concentration of the particle"));
+        }
+        Kind::Errors => return error_columns(),
+    }
+    columns.push(plain("unit", word(), "unit of the values of this row"));
+    columns.push(plain("output", DataType::UInt16, "number of the output in the plan, from 0"));
+    columns
+}
+
+fn error_columns() -> Vec<Column> {
+    let norm = |name: &str, doc: &str| Column::new(name, DataType::Float64, Measured::Row, doc).or_null();
+    let ratio = |name: &str, doc: &str| {
+        Column::new(name, DataType::Float64, Measured::Fixed(Dimension::NONE), doc).or_null()
+    };
+    let [point, replicate, t] = head();
+    let t = Column { doc: "time; null is all times of the output together".to_owned(), ..t.or_null() };
+    vec![
+        point,
+        replicate,
+        t,
+        plain("reference", word(), "name of the reference"),
+        plain("output", DataType::UInt16, "number of the output in the plan, from 0"),
+        plain("kind", word(), "table of the compared values"),
+        plain("species_a", word(), "species, or the first of a pair"),
+        plain("species_b", word(), "the second species of a pair").or_null(),
+        plain("n", DataType::UInt64, "values compared: bins that are not empty, times"),
+        norm("l1", "integral of |result - reference|: unit times m per axis"),
+        norm("l2", "root of the integral of (result - reference)^2: unit times m^(1/2) per axis"),
+        norm("linf", "largest |result - reference|"),
+        norm("rmse", "root of the mean of (result - reference)^2"),
+        ratio("relative_l1", "l1 / l1 of the reference"),
+        ratio("relative_l2", "l2 / l2 of the reference"),
+        ratio("relative_linf", "linf / linf of the reference"),
+        ratio("relative_rmse", "rmse / root mean square of the reference"),
+        plain("unit", word(), "SI unit of the compared values"),
+    ]
+}
+
+fn plain(name: &str, shape: DataType, doc: &str) -> Column {
+    Column::new(name, shape, Measured::Unitless, doc)
+}
+
+fn row_value(name: &str, doc: &str) -> Column {
+    Column::new(name, DataType::Float64, Measured::Row, doc).or_null()
+}
+
+fn head() -> [Column; 3] {
+    [
+        plain("point", DataType::UInt32, "number of the point of the sweep, 0 for a single run"),
+        plain("replicate", DataType::UInt32, "number of the replicate, from 0"),
+        Column::new("t", DataType::Float64, Measured::Fixed(Dimension::TIME), "time"),
+    ]
+}
+
+fn coordinates() -> [Column; 3] {
+    ["x", "y", "z"].map(|name| {
+        let doc = "position in the (moving) frame, of a bin its centre; null if the output has no such axis";
+        Column::new(name, DataType::Float64, Measured::Fixed(Dimension::LENGTH), doc).or_null()
+    })
+}
+
+fn species() -> Column {
+    plain("species", word(), "name of the species in the scene")
+}
+
+fn pair() -> [Column; 2] {
+    [
+        plain("species_a", word(), "first species of the pair"),
+        plain("species_b", word(), "second species of the pair"),
+    ]
+}
+
+fn concentration(doc: &str) -> Column {
+    row_value("concentration", doc)
+}
+
+fn n_particles() -> Column {
+    plain("n_particles", DataType::UInt64, "particles in the bin")
+}
+
+/// The Arrow schema; unit and description travel with each field.
+pub fn arrow_schema(columns: &[Column], row_unit: Option<&str>) -> Arc<Schema> {
+    let field = |column: &Column| {
+        let unit = column.unit_text(row_unit);
+        let metadata: HashMap<String, String> = [("unit", unit), ("doc", column.doc.clone())]
+            .into_iter()
+            .filter(|(_, text)| !text.is_empty())
+            .map(|(key, text)| (key.to_owned(), text))
+            .collect();
+        Field::new(&column.name, column.shape.clone(), column.is_nullable).with_metadata(metadata)
+    };
+    Arc::new(Schema::new(columns.iter().map(field).collect::<Vec<_>>()))
+}

@@ -1,0 +1,110 @@
+//! Units of the columns, as text and as exponents of the base dimensions.
+//!
+//! Owns which SI unit each value of an output has. May use `units` and `plan`. It deliberately
+//! converts nothing but the factor that the plan states.
+
+use crate::plan::{Output, OutputKind, Plan, Quantity};
+use crate::units::Dimension;
+use crate::units::dimension::SCALE;
+
+/// The unit of one value of one output: `written value = SI value / factor`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ValueUnit {
+    pub text: String,
+    pub dimension: Dimension,
+    pub factor: f64,
+}
+
+/// Symbols of the base units with their place in [`Dimension`], in the order they are written.
+const SYMBOLS: [(usize, &str); 7] =
+    [(1, "kg"), (3, "mol"), (0, "m"), (2, "s"), (4, "K"), (5, "A"), (6, "cd")];
+
+/// A dimension as a product of SI base units, `mol/m^3` or `1`.
+pub fn si_text(dimension: Dimension) -> String {
+    let part = |sign: i16| {
+        SYMBOLS
+            .iter()
+            .filter(|(idx, _)| dimension.0[*idx] * sign > 0)
+            .map(|(idx, symbol)| power(symbol, dimension.0[*idx] * sign))
+            .collect::<Vec<_>>()
+    };
+    let (above, below) = (part(1), part(-1));
+    let above = if above.is_empty() { "1".to_owned() } else { above.join(" ") };
+    match below.len() {
+        0 => above,
+        1 => format!("{above}/{}", below[0]),
+        _ => format!("{above}/({})", below.join(" ")),
+    }
+}
+
+fn power(symbol: &str, sixtieths: i16) -> String {
+    if sixtieths == SCALE {
+        symbol.to_owned()
+    } else if sixtieths % SCALE == 0 {
+        format!("{symbol}^{}", sixtieths / SCALE)
+    } else {
+        format!("{symbol}^{}", exponent(sixtieths))
+    }
+}
+
+/// An exponent in sixtieths as a number.
+pub fn exponent(sixtieths: i16) -> f64 {
+    f64::from(sixtieths) / f64::from(SCALE)
+}
+
+/// Dimension of what `output` holds for `quantity`, in a domain of `n_axes` axes.
+///
+/// Concentration mol/m³ or kg/m³; covariance the product of two; total concentration × m^d;
+/// mixing the product of two × m^d.
+pub fn dimension_of(plan: &Plan, kind: OutputKind, quantity: Quantity, n_axes: usize) -> Dimension {
+    let concentration = match quantity {
+        Quantity::Species(s) => concentration_of(plan, s),
+        Quantity::Pair(a, b) => product(concentration_of(plan, a), concentration_of(plan, b)),
+    };
+    match kind {
+        OutputKind::Profile | OutputKind::Map | OutputKind::Particles | OutputKind::Covariance => {
+            concentration
+        }
+        OutputKind::Total | OutputKind::Mixing => {
+            product(concentration, Dimension::new(n_axes as i16, 0, 0, 0))
+        }
+    }
+}
+
+/// The unit in which `output` is written for `quantity`.
+pub fn value_unit(plan: &Plan, output: &Output, quantity: Quantity, n_axes: usize) -> ValueUnit {
+    let dimension = dimension_of(plan, output.kind, quantity, n_axes);
+    match &output.unit {
+        Some(unit) => ValueUnit { text: unit.text.clone(), dimension, factor: unit.factor },
+        None => ValueUnit { text: si_text(dimension), dimension, factor: 1.0 },
+    }
+}
+
+fn concentration_of(plan: &Plan, species_idx: usize) -> Dimension {
+    match plan.species.get(species_idx) {
+        Some(species) if !species.is_molar => Dimension::MASS_CONCENTRATION,
+        _ => Dimension::MOLAR_CONCENTRATION,
+    }
+}
+
+fn product(a: Dimension, b: Dimension) -> Dimension {
+    Dimension(std::array::from_fn(|k| a.0[k] + b.0[k]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn base_units_are_written_as_a_reader_expects() {
+        let text = |l, m, t, n| si_text(Dimension::new(l, m, t, n));
+        assert_eq!(text(-3, 0, 0, 1), "mol/m^3");
+        assert_eq!(text(-2, 1, 0, 0), "kg/m^2");
+        assert_eq!(text(0, 0, 0, 0), "1");
+        assert_eq!(text(0, 0, -1, 0), "1/s");
+        assert_eq!(text(-5, 1, 0, 1), "kg mol/m^5");
+        assert_eq!(text(2, 0, -1, 0), "m^2/s");
+        assert_eq!(text(-3, 0, -1, 1), "mol/(m^3 s)");
+        assert_eq!(si_text(Dimension([SCALE / 2, 0, 0, 0, 0, 0, 0])), "m^0.5");
+    }
+}
