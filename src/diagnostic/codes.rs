@@ -44,6 +44,9 @@ codes! {
     F103 "a file or folder cannot be written",
     F104 "there is no such message code",
     R101 "the run was interrupted",
+    R102 "a value of the run is no longer right",
+    R103 "the machine cannot give what the run needs",
+    R104 "the plan contradicts itself",
 }
 
 /// The entry of a code as a user types it (`u104` and `U104` are the same).
