@@ -6,6 +6,7 @@ pub mod catalog;
 pub mod diagnostic;
 pub mod engine;
 pub mod maths;
+pub mod measure;
 pub mod plan;
 pub mod source;
 pub mod syntax;

@@ -1,0 +1,215 @@
+//! Fields over the bins and times of one output, and their norms.
+//!
+//! Owns the arithmetic of field expressions. May use the other parts of `measure`. It deliberately
+//! interpolates nothing: fields of different grids do not mix.
+
+use super::grid::Grid;
+use super::observed::Run;
+use super::reference::Prepared;
+use crate::plan::evaluation::Field;
+
+/// Sums from which all norms follow.
+pub(super) struct Norms {
+    weight: f64,
+    count: u64,
+    sum: f64,
+    sum_of_sizes: f64,
+    sum_of_squares: f64,
+    minimum: f64,
+    maximum: f64,
+}
+
+impl Norms {
+    pub(super) fn new(weight: f64) -> Self {
+        Self {
+            weight,
+            count: 0,
+            sum: 0.0,
+            sum_of_sizes: 0.0,
+            sum_of_squares: 0.0,
+            minimum: f64::INFINITY,
+            maximum: f64::NEG_INFINITY,
+        }
+    }
+
+    pub(super) fn add(&mut self, value: f64) {
+        self.count += 1;
+        self.sum += value;
+        self.sum_of_sizes += value.abs();
+        self.sum_of_squares += value * value;
+        // A value that is not a number must show: `f64::min` would pass over it.
+        self.minimum = if value.is_nan() || value < self.minimum { value } else { self.minimum };
+        self.maximum = if value.is_nan() || value > self.maximum { value } else { self.maximum };
+    }
+
+    pub(super) fn count(&self) -> u64 {
+        self.count
+    }
+
+    pub(super) fn l1(&self) -> f64 {
+        self.sum_of_sizes * self.weight
+    }
+
+    pub(super) fn l2(&self) -> f64 {
+        (self.sum_of_squares * self.weight).sqrt()
+    }
+
+    pub(super) fn l_inf(&self) -> f64 {
+        if self.count == 0 { 0.0 } else { largest(-self.minimum, self.maximum) }
+    }
+
+    pub(super) fn rmse(&self) -> f64 {
+        (self.sum_of_squares / self.count as f64).sqrt()
+    }
+
+    pub(super) fn mean(&self) -> f64 {
+        self.sum / self.count as f64
+    }
+
+    pub(super) fn integral(&self) -> f64 {
+        self.sum * self.weight
+    }
+
+    pub(super) fn minimum(&self) -> f64 {
+        if self.count == 0 { f64::NAN } else { self.minimum }
+    }
+
+    pub(super) fn maximum(&self) -> f64 {
+        if self.count == 0 { f64::NAN } else { self.maximum }
+    }
+}
+
+fn largest(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a > b { a } else { b }
+}
+
+/// A field with its grid.
+pub(super) struct Values {
+    pub(super) grid: Grid,
+    pub(super) times: Vec<AtTime>,
+}
+
+/// A field at one time, over the bins.
+pub(super) struct AtTime {
+    pub(super) t: f64,
+    pub(super) values: Vec<f64>,
+    /// False where an output in the expression has no particles.
+    pub(super) is_filled: Vec<bool>,
+}
+
+/// The output whose bins and times a field takes: that of its first output, else that of its
+/// first reference, preferably `hint`.
+pub(super) fn output_of(
+    run: &Run,
+    references: &[Prepared],
+    field: &Field,
+    hint: Option<usize>,
+) -> Result<Option<usize>, String> {
+    Ok(match field {
+        Field::Number(_) => None,
+        Field::Output(kind, quantity) => {
+            Some(run.find(*kind, *quantity).ok_or("no output of the run has that species or pair.")?)
+        }
+        Field::Reference(idx) => {
+            let reference = references.get(*idx).ok_or("it uses a reference that does not exist.")?;
+            let applies = |&output_idx: &usize| reference.applies_to(run.output(output_idx));
+            let found = hint.filter(applies).or_else(|| (0..run.plan.outputs.len()).find(applies));
+            Some(found.ok_or("no output of the run is of the kind that its reference predicts.")?)
+        }
+        Field::Unary(_, a) => output_of(run, references, a, hint)?,
+        Field::Binary(_, a, b) => {
+            let hint = first_output(run, field).or(hint);
+            let (a, b) = (output_of(run, references, a, hint)?, output_of(run, references, b, hint)?);
+            a.or(b)
+        }
+    })
+}
+
+/// The first output that a field names.
+pub(super) fn first_output(run: &Run, field: &Field) -> Option<usize> {
+    match field {
+        Field::Number(_) | Field::Reference(_) => None,
+        Field::Output(kind, quantity) => run.find(*kind, *quantity),
+        Field::Unary(_, a) => first_output(run, a),
+        Field::Binary(_, a, b) => first_output(run, a).or_else(|| first_output(run, b)),
+    }
+}
+
+/// The values of a field on the bins and times of an output.
+pub(super) fn values(
+    run: &Run,
+    references: &[Prepared],
+    field: &Field,
+    output_idx: usize,
+) -> Result<Values, String> {
+    let output = run.output(output_idx);
+    let series = run.series(output_idx, output.quantities[0])?;
+    let n_bins = series.grid.n_bins();
+    let times = series
+        .times
+        .iter()
+        .map(|observed| AtTime { t: observed.t, values: vec![0.0; n_bins], is_filled: vec![true; n_bins] })
+        .collect();
+    let mut empty = Values { grid: series.grid, times };
+    fill(run, references, field, &mut empty)?;
+    Ok(empty)
+}
+
+/// Replaces the values of `target` by those of the field; bins without particles are marked.
+fn fill(run: &Run, references: &[Prepared], field: &Field, target: &mut Values) -> Result<(), String> {
+    match field {
+        Field::Number(number) => target.times.iter_mut().for_each(|time| time.values.fill(*number)),
+        Field::Output(kind, quantity) => {
+            let output_idx =
+                run.find(*kind, *quantity).ok_or("no output of the run has that species or pair.")?;
+            let series = run.series(output_idx, *quantity)?;
+            let has_same_times = series.times.len() == target.times.len()
+                && series.times.iter().zip(&target.times).all(|(a, b)| a.t == b.t);
+            if series.grid != target.grid || !has_same_times {
+                return Err("it combines outputs whose bins or times differ.".into());
+            }
+            for (time, observed) in target.times.iter_mut().zip(series.times) {
+                time.values = observed.values;
+                time.is_filled = observed.is_filled;
+            }
+        }
+        Field::Reference(idx) => {
+            for time in &mut target.times {
+                time.values = references[*idx].bin_means(time.t, &target.grid);
+            }
+        }
+        Field::Unary(operator, a) => {
+            fill(run, references, a, target)?;
+            let values = target.times.iter_mut().flat_map(|time| &mut time.values);
+            values.for_each(|value| *value = operator.apply(*value));
+        }
+        Field::Binary(operator, a, b) => {
+            let mut other = target.blank();
+            fill(run, references, a, target)?;
+            fill(run, references, b, &mut other)?;
+            target.combine(&other, |a, b| operator.apply(a, b));
+        }
+    }
+    Ok(())
+}
+
+impl Values {
+    /// The same bins and times without values.
+    fn blank(&self) -> Self {
+        let times = self.times.iter().map(|time| AtTime {
+            t: time.t,
+            values: vec![0.0; time.values.len()],
+            is_filled: vec![true; time.values.len()],
+        });
+        Self { grid: self.grid.clone(), times: times.collect() }
+    }
+
+    fn combine(&mut self, other: &Self, operator: impl Fn(f64, f64) -> f64) {
+        for (time, other) in self.times.iter_mut().zip(&other.times) {
+            for (bin, value) in time.values.iter_mut().enumerate() {
+                *value = operator(*value, other.values[bin]);
+                time.is_filled[bin] &= other.is_filled[bin];
+            }
+        }
+    }
+}

@@ -1,0 +1,89 @@
+//! What a run found for one quantity of one output.
+//!
+//! Owns the way from snapshots to columns. May use `plan` and the engine's snapshots. It deliberately
+//! compares nothing.
+
+use super::grid::Grid;
+use crate::engine::snapshot::{Outcome, Snapshot, Values};
+use crate::plan::{Output, OutputKind, Plan, Quantity};
+
+/// A finished run.
+pub(super) struct Run<'a> {
+    pub(super) plan: &'a Plan,
+    pub(super) snapshots: &'a [Snapshot],
+    pub(super) outcome: &'a Outcome,
+}
+
+/// Values at one time over the bins of a grid (one value if it has none).
+pub(super) struct Observed {
+    pub(super) t: f64,
+    pub(super) values: Vec<f64>,
+    pub(super) standard_errors: Option<Vec<f64>>,
+    /// False for a bin that no particle was in.
+    pub(super) is_filled: Vec<bool>,
+}
+
+/// All times of one quantity.
+pub(super) struct Series {
+    pub(super) output_idx: usize,
+    pub(super) grid: Grid,
+    pub(super) times: Vec<Observed>,
+}
+
+impl Run<'_> {
+    pub(super) fn output(&self, output_idx: usize) -> &Output {
+        &self.plan.outputs[output_idx]
+    }
+
+    /// The first output of that kind that has the quantity.
+    pub(super) fn find(&self, kind: OutputKind, quantity: Quantity) -> Option<usize> {
+        self.plan.outputs.iter().position(|output| output.kind == kind && column(output, quantity).is_some())
+    }
+
+    /// The values of a quantity at all times of an output.
+    pub(super) fn series(&self, output_idx: usize, quantity: Quantity) -> Result<Series, String> {
+        let output = self.output(output_idx);
+        let column = column(output, quantity).ok_or("the output lacks that species or pair.")?;
+        let grid = Grid::of(self.plan, output)?;
+        let times = self
+            .snapshots
+            .iter()
+            .filter(|snapshot| snapshot.output_idx == output_idx)
+            .map(|snapshot| observed(snapshot, column, grid.n_bins()))
+            .collect::<Result<Vec<_>, _>>()?;
+        Ok(Series { output_idx, grid, times })
+    }
+}
+
+/// Where a quantity stands among those of an output; a pair is the same in either order.
+pub(super) fn column(output: &Output, quantity: Quantity) -> Option<usize> {
+    output.quantities.iter().position(|&listed| match (listed, quantity) {
+        (Quantity::Pair(a, b), Quantity::Pair(c, d)) => (a, b) == (c, d) || (a, b) == (d, c),
+        _ => listed == quantity,
+    })
+}
+
+fn observed(snapshot: &Snapshot, column: usize, n_bins: usize) -> Result<Observed, String> {
+    let single = |value: Option<f64>| value.map(|value| (vec![value], None, vec![true]));
+    let found = match &snapshot.values {
+        Values::Binned { mean, standard_error, n_particles } => mean
+            .get(column)
+            .map(|mean| (mean.clone(), standard_error.get(column).cloned(), filled(n_particles))),
+        Values::Covariance { covariance, n_particles } => {
+            covariance.get(column).map(|values| (values.clone(), None, filled(n_particles)))
+        }
+        Values::Total { amount } => single(amount.get(column).copied()),
+        Values::Mixing(states) => single(states.get(column).map(|state| state.gamma)),
+        Values::Particles { .. } => None,
+    };
+    match found {
+        Some((values, standard_errors, is_filled)) if values.len() == n_bins && is_filled.len() == n_bins => {
+            Ok(Observed { t: snapshot.t, values, standard_errors, is_filled })
+        }
+        _ => Err("The snapshots of an output do not have its bins and columns.".into()),
+    }
+}
+
+fn filled(n_particles: &[u64]) -> Vec<bool> {
+    n_particles.iter().map(|&n| n > 0).collect()
+}

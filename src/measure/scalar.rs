@@ -1,0 +1,123 @@
+//! Measures: expressions that give one number.
+//!
+//! Owns facts, norms and their arithmetic. May use the other parts of `measure`. It deliberately
+//! rounds nothing.
+
+use super::field::{Norms, first_output, output_of, values};
+use super::grid::Grid;
+use super::observed::Run;
+use super::reference::Prepared;
+use crate::engine::snapshot::Outcome;
+use crate::plan::evaluation::{Fact, Field, Measure, Norm, Scalar};
+
+/// Times that are asked for by number match those of the run to this relative distance.
+const SAME_TIME: f64 = 1e-9;
+
+/// The value of a measure; an error is the end of a sentence about it.
+pub(super) fn value(run: &Run, references: &[Prepared], measure: &Measure) -> Result<f64, String> {
+    let hint = output_in(run, &measure.value);
+    Evaluator { run, references, measure, hint }.scalar(&measure.value)
+}
+
+/// The first output that a measure names: references alone are taken on its bins, too.
+fn output_in(run: &Run, scalar: &Scalar) -> Option<usize> {
+    match scalar {
+        Scalar::Number(_) | Scalar::Fact(_) => None,
+        Scalar::Norm(_, field) => first_output(run, field),
+        Scalar::Unary(_, a) => output_in(run, a),
+        Scalar::Binary(_, a, b) => output_in(run, a).or_else(|| output_in(run, b)),
+    }
+}
+
+struct Evaluator<'a> {
+    run: &'a Run<'a>,
+    references: &'a [Prepared<'a>],
+    measure: &'a Measure,
+    hint: Option<usize>,
+}
+
+impl Evaluator<'_> {
+    fn scalar(&self, scalar: &Scalar) -> Result<f64, String> {
+        Ok(match scalar {
+            Scalar::Number(number) => *number,
+            Scalar::Fact(fact) => value_of(*fact, self.run.outcome),
+            Scalar::Norm(norm, field) => self.norm(*norm, field)?,
+            Scalar::Unary(operator, a) => operator.apply(self.scalar(a)?),
+            Scalar::Binary(operator, a, b) => operator.apply(self.scalar(a)?, self.scalar(b)?),
+        })
+    }
+
+    fn norm(&self, norm: Norm, field: &Field) -> Result<f64, String> {
+        let output_idx = output_of(self.run, self.references, field, self.hint)?
+            .ok_or("it takes a norm of a plain number.")?;
+        let field = values(self.run, self.references, field, output_idx)?;
+        let is_within = self.bins_within(&field.grid)?;
+        let wanted = self.times_within(&field.times.iter().map(|time| time.t).collect::<Vec<_>>())?;
+        let mut norms = Norms::new(field.grid.weight);
+        for &idx in &wanted {
+            let time = &field.times[idx];
+            for (bin, &value) in time.values.iter().enumerate() {
+                if time.is_filled[bin] && is_within[bin] {
+                    norms.add(value);
+                }
+            }
+        }
+        Ok(match norm {
+            Norm::L1 => norms.l1(),
+            Norm::L2 => norms.l2(),
+            Norm::LInf => norms.l_inf(),
+            Norm::Rmse => norms.rmse(),
+            Norm::Integral => norms.integral() / wanted.len() as f64,
+            Norm::Mean => norms.mean(),
+            Norm::Minimum => norms.minimum(),
+            Norm::Maximum => norms.maximum(),
+        })
+    }
+
+    /// Which bins have their centre in the range of the measure. An axis that the run left out has no
+    /// gradient: a range along it changes no mean and is passed over.
+    fn bins_within(&self, grid: &Grid) -> Result<Vec<bool>, String> {
+        let n_bins = grid.n_bins();
+        let Some((index, low, high)) = self.measure.over else {
+            return Ok(vec![true; n_bins]);
+        };
+        if grid.axes.is_empty() {
+            return Err("a range in space is given for a total or a mixing state, which have no bins.".into());
+        }
+        let Some(axis_idx) = grid.axes.iter().position(|axis| axis.index == index) else {
+            return Ok(vec![true; n_bins]);
+        };
+        let axis = grid.axes[axis_idx];
+        // Centres on the limit count: they may be off by rounding.
+        let slack = 1e-9 * (high - low).abs();
+        let is_within = (0..n_bins).map(|bin| {
+            let centre = axis.centre(grid.bin_along(bin, axis_idx));
+            low - slack <= centre && centre <= high + slack
+        });
+        Ok(is_within.collect())
+    }
+
+    /// Indices of the times that the measure asks for.
+    fn times_within(&self, times: &[f64]) -> Result<Vec<usize>, String> {
+        let Some(wanted) = &self.measure.times else {
+            return Ok((0..times.len()).collect());
+        };
+        let find = |&t: &f64| {
+            let is_same = |other: &f64| (other - t).abs() <= SAME_TIME * t.abs().max(other.abs());
+            times.iter().position(is_same).ok_or_else(|| format!("its output has no values at {t} s."))
+        };
+        wanted.iter().map(find).collect()
+    }
+}
+
+fn value_of(fact: Fact, outcome: &Outcome) -> f64 {
+    match fact {
+        Fact::WallTime => outcome.wall,
+        Fact::CpuTime => outcome.cpu,
+        Fact::MassDefect => {
+            outcome.mass_defect.iter().copied().fold(0.0, |a, b| if a.is_nan() || a > b { a } else { b })
+        }
+        Fact::Particles => outcome.n_particles as f64,
+        Fact::Steps => outcome.n_steps as f64,
+    }
+}
