@@ -265,3 +265,63 @@ fn species_of_one_unit_give_the_column_that_unit() {
     let unit = |name: &str| footer.columns.iter().find(|column| column.name == name).unwrap().unit.clone();
     assert_eq!((unit("concentration"), unit("x"), unit("t")), ("kg/m^3".into(), "m".into(), "s".into()));
 }
+
+/// `/dev/full` answers every write as a full disk does.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_is_named_and_the_earlier_run_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path());
+    let before = files(folder.path());
+    let mut writer = Writer::create(folder.path(), &common::plan(), &common::record()).unwrap();
+    writer.write(&common::snapshots()[0]).unwrap();
+    let temporary = folder.path().join(format!(".points.parquet.tmp-{}", std::process::id()));
+    std::os::unix::fs::symlink("/dev/full", temporary).unwrap();
+    let error = writer.finish(vec![common::point()], &[]).unwrap_err();
+    assert!(
+        matches!(&error, TableError::DiskFull { file, .. } if file.ends_with("points.parquet")),
+        "{error}"
+    );
+    assert!(error.to_string().contains("the disk is full"), "{error}");
+    assert!(files(folder.path()) == before);
+}
+
+/// Runs the Python readers over two runs with different plans. Needs `LAMELLA_PYTHON`, a Python with
+/// `tests/python/requirements.txt`; without it the test says that nothing was checked, and fails
+/// where a check is owed (`CI` or `LAMELLA_REQUIRE_PYTHON` is set).
+#[test]
+fn other_tools_read_every_table() {
+    let Some(python) = std::env::var_os("LAMELLA_PYTHON") else {
+        let is_owed = ["CI", "LAMELLA_REQUIRE_PYTHON"].iter().any(|name| std::env::var_os(name).is_some());
+        assert!(!is_owed, "LAMELLA_PYTHON is not set, so pyarrow, polars, DuckDB and pandas were not tried");
+        eprintln!(
+            "NOT CHECKED: LAMELLA_PYTHON is not set; pyarrow, polars, DuckDB and pandas were not tried"
+        );
+        return;
+    };
+    let parent = tempfile::tempdir().unwrap();
+    let (first, second) = (parent.path().join("first"), parent.path().join("it's second"));
+    write(&first);
+    write_plan(&second, &other_plan(), &common::snapshots());
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let output = std::process::Command::new(python)
+        .arg(root.join("tests/python/open_tables.py"))
+        .arg(root.join("docs/schema/footer-1.json"))
+        .args([first, second])
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(output.status.success(), "{text}{}", String::from_utf8_lossy(&output.stderr));
+    assert!(text.contains("7 tables read across 2 runs; 0 failures"), "{text}");
+}
+
+/// The same outputs with the species in another order and one more in front, so that every number in
+/// a dictionary means another word.
+fn other_plan() -> Plan {
+    let mut plan = common::plan();
+    plan.species.rotate_left(1);
+    let more = plan.species[0].clone();
+    plan.species.insert(0, lamella::plan::Species { name: "nitrate NO₃⁻".to_owned(), ..more });
+    plan.outputs[1].unit = None;
+    plan
+}

@@ -14,6 +14,7 @@ use parquet::file::properties::{EnabledStatistics, WriterProperties};
 use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Rows of a row group: DuckDB's unit of parallel work, and the bound on buffered rows.
 pub const ROW_GROUP: usize = 122_880;
@@ -97,9 +98,14 @@ pub struct Finished {
 }
 
 impl Sheet {
+    /// The footer goes into the file's metadata, where most tools look, and into the Arrow schema,
+    /// where pyarrow and pandas look.
     pub fn create(target: &Path, schema: SchemaRef, footer: &Footer) -> Result<Self, TableError> {
+        let pairs = footer.key_values();
+        let schema =
+            schema.as_ref().clone().with_metadata(pairs.iter().cloned().collect::<arrow_schema::Metadata>());
         let (draft, file) = Draft::new(target)?;
-        let writer = ArrowWriter::try_new(file, schema, Some(properties(footer)))
+        let writer = ArrowWriter::try_new(file, Arc::new(schema), Some(properties(pairs)))
             .map_err(|reason| TableError::parquet(target, reason, 0))?;
         Ok(Self { draft, writer, n_rows: 0 })
     }
@@ -127,8 +133,8 @@ impl Sheet {
     }
 }
 
-fn properties(footer: &Footer) -> WriterProperties {
-    let metadata = footer.key_values().into_iter().map(|(key, value)| KeyValue::new(key, value)).collect();
+fn properties(pairs: Vec<(String, String)>) -> WriterProperties {
+    let metadata = pairs.into_iter().map(|(key, value)| KeyValue::new(key, value)).collect();
     WriterProperties::builder()
         .set_created_by(CREATED_BY.to_owned())
         .set_compression(Compression::ZSTD(ZstdLevel::try_new(3).unwrap_or_default()))
