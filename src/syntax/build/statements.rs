@@ -1,0 +1,303 @@
+//! One function per statement: its parts in the order of the grammar.
+//!
+//! Owns the shapes of statements. May use the expressions beside it.
+//! It deliberately resolves no name; clauses in free order are counted, nothing else is checked.
+
+use super::expressions::{bare_number, operand};
+use super::{Parts, Place, span_at, spanned};
+use crate::diagnostic::{Diagnostic, codes};
+use crate::source::{Span, Spanned};
+use crate::syntax::climb::Built;
+use crate::syntax::grammar::Rule;
+use crate::syntax::tree::{
+    Arrow, Assignment, Average, Axis, Boundary, Domain, Field, Flow, Function, Let, Measure, Output, Param,
+    Particles, Reaction, Reference, Run, Species, StatementKind, Target, Term, Times, Zone,
+};
+use pest::iterators::Pair;
+
+/// The kind of the statement whose rule is `rule`.
+pub fn kind(mut parts: Parts, rule: Rule) -> Built<StatementKind> {
+    use StatementKind as S;
+    let parts = &mut parts;
+    Ok(match rule {
+        Rule::edition => S::Edition(whole_number(parts, "an edition")?),
+        Rule::title => S::Title(parts.text()?),
+        Rule::cite => {
+            S::Cite(std::iter::from_fn(|| parts.optional_text().transpose()).collect::<Built<_>>()?)
+        }
+        Rule::seed => S::Seed(whole_number(parts, "a seed")?),
+        Rule::constant => {
+            S::Let(Let { name: parts.name()?, value: parts.expression()?, doc: parts.optional_text()? })
+        }
+        Rule::parameter => S::Param(parameter(parts)?),
+        Rule::function => S::Function(Function {
+            name: parts.name()?,
+            parameters: parts.names(Rule::name),
+            body: parts.expression()?,
+        }),
+        Rule::species => S::Species(each(parts, Rule::species_item, species)?),
+        Rule::reaction => S::Reaction(reaction(parts)?),
+        Rule::domain => S::Domain(domain(parts)?),
+        Rule::boundary => S::Boundary(Boundary {
+            sides: parts.names(Rule::side),
+            kind: parts.wrapped_name(Rule::boundary_kind)?,
+        }),
+        Rule::flow => {
+            S::Flow(Flow { kind: parts.wrapped_name(Rule::kind)?, argument: parts.optional_expression()? })
+        }
+        Rule::dispersion => S::Dispersion(parts.expression()?),
+        Rule::mixing => S::MixingZones(each(parts, Rule::zone, zone)?),
+        Rule::average => {
+            S::Average(Average { kind: parts.wrapped_name(Rule::kind)?, counts: counts(parts)? })
+        }
+        Rule::initial => S::Initial(each(parts, Rule::assignment, assignment)?),
+        Rule::particles => S::Particles(particles(parts)?),
+        Rule::run => S::Run(run(parts)?),
+        Rule::output => S::Output(output(parts)?),
+        Rule::reference => S::Reference(reference(parts)?),
+        _ => S::Measure(measure(parts)?),
+    })
+}
+
+/// All following parts of one rule, each built by `build`.
+fn each<T>(parts: &mut Parts, rule: Rule, build: fn(&mut Parts) -> Built<T>) -> Built<Vec<T>> {
+    let place = parts.place;
+    std::iter::from_fn(|| parts.take(rule)).map(|pair| build(&mut Parts::of(place, pair))).collect()
+}
+
+fn whole_number<T: std::str::FromStr>(parts: &mut Parts, what: &str) -> Built<Spanned<T>> {
+    let pair = parts.need(Rule::bare_number)?;
+    let span = span_at(parts.place, &pair);
+    match pair.as_str().replace('_', "").parse() {
+        Ok(value) => Ok(Spanned::new(value, span)),
+        Err(_) => Err(Box::new(
+            Diagnostic::error(codes::S013, format!("{what} is a whole number"))
+                .at(span, "not a whole number in its range")
+                .expected("digits only, such as `42`"),
+        )),
+    }
+}
+
+fn parameter(parts: &mut Parts) -> Built<Param> {
+    let (name, value) = (parts.name()?, parts.expression()?);
+    let has_range = parts.pairs.peek().is_some_and(|pair| pair.as_rule() == Rule::range);
+    let range = has_range.then(|| parts.range()).transpose()?;
+    Ok(Param { name, value, range, doc: parts.optional_text()? })
+}
+
+fn species(parts: &mut Parts) -> Built<Species> {
+    let name = parts.name()?;
+    let mut qualifiers = parts.names(Rule::qualifier);
+    let doc = parts.optional_text()?;
+    qualifiers.extend(parts.names(Rule::qualifier));
+    Ok(Species { name, qualifiers, doc })
+}
+
+fn reaction(parts: &mut Parts) -> Built<Reaction> {
+    let name = parts.take(Rule::label).map(|label| Parts::of(parts.place, label).name()).transpose()?;
+    let reactants = side(parts, Rule::reactants)?;
+    let arrow = parts.need(Rule::arrow)?;
+    let direction = if arrow.as_str() == "->" { Arrow::Forward } else { Arrow::Both };
+    let arrow = Spanned::new(direction, span_at(parts.place, &arrow));
+    let products = side(parts, Rule::products)?;
+    Ok(Reaction { name, reactants, arrow, products, rate: parts.expression()? })
+}
+
+fn side(parts: &mut Parts, rule: Rule) -> Built<Vec<Term>> {
+    let Some(pair) = parts.take(rule) else { return Ok(Vec::new()) };
+    each(&mut Parts::of(parts.place, pair), Rule::term, |parts| {
+        let place = parts.place;
+        let coefficient = parts.take(Rule::bare_number).map(|pair| spanned(place, &pair));
+        let coefficient = coefficient.map(|it| Spanned::new(it.value.replace('_', ""), it.span));
+        Ok(Term { coefficient, species: parts.name()? })
+    })
+}
+
+fn domain(parts: &mut Parts) -> Built<Domain> {
+    let shape = parts.wrapped_name(Rule::shape)?;
+    let (mut axes, mut frame) = (Vec::new(), Once::default());
+    while let Some(pair) = parts.next() {
+        let span = span_at(parts.place, &pair);
+        let mut inner = Parts::of(parts.place, pair);
+        match inner.pairs.peek().map(Pair::as_rule) {
+            Some(Rule::axis_name) => axes.push(axis(&mut inner)?),
+            Some(Rule::expression) => frame.set("frame moving", span, inner.expression()?)?,
+            _ => break,
+        }
+    }
+    Ok(Domain { shape, axes, frame: frame.value() })
+}
+
+fn axis(parts: &mut Parts) -> Built<Axis> {
+    let name = parts.need(Rule::axis_name)?;
+    Ok(Axis { name: spanned(parts.place, &name), range: parts.range()? })
+}
+
+fn zone(parts: &mut Parts) -> Built<Zone> {
+    let name = parts.wrapped_name(Rule::label)?;
+    let fields =
+        each(parts, Rule::zone_field, |parts| Ok(Field { name: parts.name()?, value: parts.expression()? }))?;
+    Ok(Zone { name, fields })
+}
+
+fn counts(parts: &mut Parts) -> Built<Vec<Spanned<f64>>> {
+    let pair = parts.need(Rule::counts)?;
+    let mut parts = Parts::of(parts.place, pair);
+    let mut counts = Vec::new();
+    while let Some(pair) = parts.take(Rule::bare_number) {
+        let value = pair.as_str().replace('_', "").parse().unwrap_or(f64::INFINITY);
+        counts.push(Spanned::new(value, span_at(parts.place, &pair)));
+    }
+    Ok(counts)
+}
+
+fn assignment(parts: &mut Parts) -> Built<Assignment> {
+    Ok(Assignment { name: parts.name()?, value: parts.expression()? })
+}
+
+fn particles(parts: &mut Parts) -> Built<Particles> {
+    let kind = parts.wrapped_name(Rule::kind)?;
+    let place = parts.place;
+    let count = parts.need(Rule::count)?;
+    let mut inner = Parts::of(place, count);
+    let count = match inner.take(Rule::bare_number) {
+        Some(number) => bare_number(place, number)?,
+        None => operand(place, inner.need(Rule::path)?)?.expr,
+    };
+    let placement = parts.take(Rule::placement).map(|pair| Parts::of(place, pair).name()).transpose()?;
+    Ok(Particles { kind, count, placement })
+}
+
+fn run(parts: &mut Parts) -> Built<Run> {
+    let duration = parts.expression()?;
+    let (mut step, mut settings) = (Once::default(), Vec::new());
+    while let Some(pair) = parts.next() {
+        let (rule, span) = (pair.as_rule(), span_at(parts.place, &pair));
+        let mut inner = Parts::of(parts.place, pair);
+        match rule {
+            Rule::run_step => step.set("step", span, inner.expression()?)?,
+            Rule::setting => settings.push((inner.name()?, inner.name()?)),
+            _ => break,
+        }
+    }
+    Ok(Run { duration, step: step.value(), settings })
+}
+
+fn output(parts: &mut Parts) -> Built<Output> {
+    let kind = parts.wrapped_name(Rule::output_kind)?;
+    let species = species_list(parts)?;
+    let mut clauses = Clauses::read(parts)?;
+    Ok(Output {
+        kind,
+        species,
+        times: clauses.times.value(),
+        along: clauses.along.value(),
+        grid: clauses.on.value().unwrap_or_default(),
+        unit: clauses.unit.value(),
+    })
+}
+
+fn species_list(parts: &mut Parts) -> Built<Vec<Spanned<String>>> {
+    let Some(pair) = parts.take(Rule::species_list) else { return Ok(Vec::new()) };
+    Ok(Parts::of(parts.place, pair).names(Rule::name))
+}
+
+fn reference(parts: &mut Parts) -> Built<Reference> {
+    let place = parts.place;
+    if let Some(pair) = parts.take(Rule::reference_call) {
+        let mut inner = Parts::of(place, pair);
+        let value = operand(place, inner.need(Rule::call)?)?.expr;
+        return Ok(Reference { name: None, target: target(&mut inner)?, value });
+    }
+    let pair = parts.need(Rule::reference_formula)?;
+    let mut inner = Parts::of(place, pair);
+    let name = Some(inner.name()?);
+    Ok(Reference { name, target: target(&mut inner)?, value: inner.expression()? })
+}
+
+fn target(parts: &mut Parts) -> Built<Target> {
+    let pair = parts.need(Rule::target)?;
+    let mut inner = Parts::of(parts.place, pair);
+    let output = inner.take(Rule::target_kind).map(|pair| Parts::of(inner.place, pair).name()).transpose()?;
+    Ok(Target { output, species: inner.names(Rule::name) })
+}
+
+fn measure(parts: &mut Parts) -> Built<Measure> {
+    let (name, value) = (parts.name()?, parts.expression()?);
+    let mut clauses = Clauses::read(parts)?;
+    let times = match clauses.times.value() {
+        Some(Times::List(times)) => Some(times),
+        _ => None,
+    };
+    Ok(Measure { name, value, over: clauses.over.value(), times, doc: parts.optional_text()? })
+}
+
+/// The clauses that may follow in any order, each once.
+#[derive(Default)]
+struct Clauses {
+    times: Once<Times>,
+    along: Once<Spanned<String>>,
+    on: Once<Vec<Spanned<f64>>>,
+    unit: Once<Spanned<String>>,
+    over: Once<Axis>,
+}
+
+impl Clauses {
+    fn read(parts: &mut Parts) -> Built<Self> {
+        let mut clauses = Self::default();
+        while parts.pairs.peek().is_some_and(|pair| pair.as_rule() != Rule::text) {
+            let Some(pair) = parts.next() else { break };
+            clauses.add(parts.place, pair)?;
+        }
+        Ok(clauses)
+    }
+
+    fn add(&mut self, place: Place, pair: Pair<Rule>) -> Built<()> {
+        let (rule, span) = (pair.as_rule(), keyword_span(place, &pair));
+        let mut inner = Parts::of(place, pair);
+        match rule {
+            Rule::at => self.times.set("times", span, Times::List(inner.expressions()?)),
+            Rule::every => self.times.set("times", span, Times::Every(inner.expression()?)),
+            Rule::along => self.along.set("along", span, spanned(place, &inner.need(Rule::axis_name)?)),
+            Rule::on => self.on.set("on", span, counts(&mut inner)?),
+            Rule::in_unit => self.unit.set("in", span, spanned(place, &inner.need(Rule::unit)?)),
+            _ => self.over.set(
+                "over",
+                span,
+                inner.need(Rule::axis).and_then(|pair| axis(&mut Parts::of(place, pair)))?,
+            ),
+        }
+    }
+}
+
+/// The place of the word that a clause begins with.
+fn keyword_span(place: Place, pair: &Pair<Rule>) -> Span {
+    pair.clone().into_inner().next().map_or_else(|| span_at(place, pair), |keyword| span_at(place, &keyword))
+}
+
+/// A clause that may stand once.
+struct Once<T>(Option<(Span, T)>);
+
+impl<T> Default for Once<T> {
+    fn default() -> Self {
+        Self(None)
+    }
+}
+
+impl<T> Once<T> {
+    fn set(&mut self, what: &str, span: Span, value: T) -> Built<()> {
+        if let Some((first, _)) = &self.0 {
+            let diagnostic = Diagnostic::error(codes::S011, format!("`{what}` stands here twice"))
+                .at(span, "the second")
+                .also(*first, "the first")
+                .help("keep one of them");
+            return Err(Box::new(diagnostic));
+        }
+        self.0 = Some((span, value));
+        Ok(())
+    }
+
+    fn value(&mut self) -> Option<T> {
+        self.0.take().map(|(_, value)| value)
+    }
+}

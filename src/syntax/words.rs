@@ -1,0 +1,71 @@
+//! The words that the language keeps for itself.
+//!
+//! Owns the lists of statement keywords and reserved words. May use nothing.
+//! It deliberately lists no catalogue names: those are ordinary names, resolved in `scenario`.
+
+/// The first words of the statements of this edition.
+pub const STATEMENT_KEYWORDS: &[&str] = &[
+    "lamella",
+    "title",
+    "cite",
+    "seed",
+    "let",
+    "param",
+    "fn",
+    "species",
+    "reaction",
+    "domain",
+    "boundary",
+    "flow",
+    "dispersion",
+    "mixing",
+    "average",
+    "initial",
+    "particles",
+    "run",
+    "output",
+    "reference",
+    "measure",
+];
+
+/// First words that the language description knows and this version does not run yet.
+pub const LATER_KEYWORDS: &[&str] =
+    &["medium", "source", "kernel", "use", "sweep", "report", "data", "chemistry"];
+
+/// Words that can be neither names nor units, wherever they stand.
+pub const RESERVED_WORDS: &[&str] = &[
+    "if", "then", "else", "and", "or", "not", "in", "at", "every", "along", "on", "over", "for", "until",
+    "of", "during",
+];
+
+/// Whether a word begins a statement of this or a later version.
+pub fn is_statement_keyword(word: &str) -> bool {
+    STATEMENT_KEYWORDS.contains(&word) || LATER_KEYWORDS.contains(&word)
+}
+
+/// The clause words that a statement knows, for a misspelling of one of them.
+pub fn clause_words(keyword: &str) -> &'static [&'static str] {
+    match keyword {
+        "param" => &["in"],
+        "species" => &["immobile", "mobile"],
+        "domain" => &["frame", "moving"],
+        "mixing" => &["zones", "fraction", "rate"],
+        "run" => &["to", "step"],
+        "output" => &["at", "every", "along", "on", "in"],
+        "reference" => &["for"],
+        "measure" => &["over", "at"],
+        _ => &[],
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_word_has_one_role() {
+        for word in STATEMENT_KEYWORDS.iter().chain(LATER_KEYWORDS) {
+            assert!(!RESERVED_WORDS.contains(word), "{word}");
+        }
+    }
+}
