@@ -13,13 +13,14 @@ mod new;
 #[allow(dead_code)]
 mod progress;
 #[allow(dead_code)]
+mod summary;
+#[allow(dead_code)]
 mod terminal;
 #[allow(dead_code)]
 mod text;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use lamella::diagnostic::Diagnostic;
-use lamella::source::Sources;
 use std::process::ExitCode;
 use terminal::Terminal;
 
@@ -105,9 +106,6 @@ pub(crate) fn main() -> ExitCode {
         Command::Explain(explain) => explain::run(explain, &terminal),
         Command::Completions(completions) => completions::run(completions, &terminal),
     };
-    let exit = result.unwrap_or_else(|stopped| {
-        terminal.diagnostics(&[*stopped.message], &Sources::default());
-        stopped.exit
-    });
+    let exit = result.unwrap_or_else(|stopped| terminal.stopped(stopped));
     ExitCode::from(exit as u8)
 }

@@ -47,6 +47,12 @@ impl Terminal {
         }
     }
 
+    /// Shows what stopped a command, and how the command ends.
+    pub(crate) fn stopped(&self, stopped: Stopped) -> Exit {
+        self.diagnostics(&[*stopped.message], &Sources::default());
+        stopped.exit
+    }
+
     /// Shows messages in the format asked for; `--quiet` keeps those that stop the scene.
     pub(crate) fn diagnostics(&self, diagnostics: &[Diagnostic], sources: &Sources) {
         let shown: Vec<Diagnostic> = diagnostics
