@@ -28,6 +28,11 @@ impl Span {
         Self { file: self.file, start: self.start.min(other.start), end: self.end.max(other.end) }
     }
 
+    /// Like [`Span::to`], or this span alone if the other lies in another file.
+    pub fn to_if_same_file(self, other: Span) -> Self {
+        if self.file == other.file { self.to(other) } else { self }
+    }
+
     /// The byte range, for slicing the text.
     pub fn range(self) -> std::ops::Range<usize> {
         self.start as usize..self.end as usize

@@ -1,0 +1,373 @@
+//! The phase itself: statements gathered, names defined, every part resolved in its turn.
+
+use super::check::Checker;
+use super::expression::Type;
+use super::scope::{Origin, Progress, Scope};
+use super::{Parameter, Scenario, Settings};
+use crate::diagnostic::codes::{D001, D010, M001, M002, P001, P002};
+use crate::diagnostic::{Diagnostic, did_you_mean};
+use crate::source::{Sources, Span};
+use crate::syntax::tree::{self, StatementKind};
+
+/// Statements by kind, in the order of the text.
+#[derive(Default)]
+pub(super) struct Statements<'a> {
+    pub title: Option<&'a tree::Text>,
+    pub citations: Vec<&'a tree::Text>,
+    pub seed: Option<u64>,
+    pub lets: Vec<&'a tree::Let>,
+    pub params: Vec<&'a tree::Param>,
+    pub functions: Vec<&'a tree::Function>,
+    pub species: Vec<&'a tree::Species>,
+    pub reactions: Vec<(Span, &'a tree::Reaction)>,
+    pub domain: Option<(Span, &'a tree::Domain)>,
+    pub boundaries: Vec<&'a tree::Boundary>,
+    pub flow: Option<(Span, &'a tree::Flow)>,
+    pub dispersion: Option<(Span, &'a tree::Expr)>,
+    pub zones: Option<(Span, &'a [tree::Zone])>,
+    pub average: Option<(Span, &'a tree::Average)>,
+    pub initials: Vec<&'a tree::Assignment>,
+    pub particles: Option<(Span, &'a tree::Particles)>,
+    pub run: Option<(Span, &'a tree::Run)>,
+    pub outputs: Vec<(Span, &'a tree::Output)>,
+    pub references: Vec<(Span, &'a tree::Reference)>,
+    pub measures: Vec<(Span, &'a tree::Measure)>,
+}
+
+/// Resolves a scene: everything that can be wrong is reported together.
+///
+/// `sources` gains a file for each setting of the command line, so that messages can show it.
+/// The scenario is absent if anything fatal was found. `has_syntax_errors` silences what would only
+/// follow from statements that did not parse.
+pub fn resolve(
+    file: &tree::File,
+    sources: &mut Sources,
+    settings: &Settings,
+    has_syntax_errors: bool,
+) -> (Option<Scenario>, Vec<Diagnostic>) {
+    let mut diagnostics = Vec::new();
+    let overrides = read_overrides(file, sources, settings, &mut diagnostics);
+    let statements = gather(file, &mut diagnostics);
+    let mut checker = Checker {
+        scope: Scope::default(),
+        diagnostics,
+        axes: super::geometry::axis_names(&statements),
+        species_dimensions: vec![None; statements.species.len()],
+        call_stack: Vec::new(),
+    };
+    define_names(&mut checker, &statements, &overrides);
+    let scenario = build(&mut checker, &statements, settings, file, has_syntax_errors);
+    let axes: Vec<String> = checker.axes.iter().map(|(name, _)| name.clone()).collect();
+    let mut diagnostics = std::mem::take(&mut checker.diagnostics);
+    if !has_syntax_errors {
+        checker.scope.report_undefined(&axes, &mut diagnostics);
+        report_unused(&checker.scope, &mut diagnostics);
+    }
+    let diagnostics = in_order(diagnostics, has_syntax_errors);
+    let is_fatal = has_syntax_errors || crate::diagnostic::any_fatal(&diagnostics);
+    (scenario.filter(|_| !is_fatal), diagnostics)
+}
+
+/// Names and definitions first, then what follows from them; each by place, each once.
+fn in_order(mut diagnostics: Vec<Diagnostic>, has_syntax_errors: bool) -> Vec<Diagnostic> {
+    let rank = |diagnostic: &Diagnostic| {
+        let family = diagnostic.code.0.as_bytes()[0];
+        let weight = match family {
+            _ if !diagnostic.is_fatal() => 3,
+            b'P' => 0,
+            // A missing statement is often a consequence of a misspelt one elsewhere.
+            b'M' if diagnostic.code == M001 => 2,
+            _ => 1,
+        };
+        (weight, diagnostic.primary_span().map(|span| (span.file, span.start)))
+    };
+    diagnostics.sort_by_key(rank);
+    let mut seen = std::collections::BTreeSet::new();
+    diagnostics.retain(|diagnostic| {
+        let is_new = seen.insert((diagnostic.code, diagnostic.primary_span(), diagnostic.message.clone()));
+        is_new && !(has_syntax_errors && diagnostic.code == M001)
+    });
+    diagnostics
+}
+
+fn gather<'a>(file: &'a tree::File, diagnostics: &mut Vec<Diagnostic>) -> Statements<'a> {
+    let mut all = Statements::default();
+    let mut first_of: std::collections::BTreeMap<&'static str, Span> = std::collections::BTreeMap::new();
+    for statement in &file.statements {
+        let span = statement.span;
+        if let Some(what) = single(&statement.kind)
+            && let Some(first) = first_of.insert(what, statement.keyword)
+        {
+            first_of.insert(what, first);
+            diagnostics.push(
+                Diagnostic::error(M002, format!("a second `{what}` statement"))
+                    .at(statement.keyword, "a scene has one of these")
+                    .also(first, "the first one is here")
+                    .found(format!("`{what}` twice"))
+                    .expected(format!("one `{what}` statement"))
+                    .help("delete one of the two"),
+            );
+            continue;
+        }
+        match &statement.kind {
+            StatementKind::Edition(_) => {}
+            StatementKind::Title(text) => all.title = Some(text),
+            StatementKind::Cite(texts) => all.citations.extend(texts),
+            StatementKind::Seed(seed) => all.seed = Some(seed.value),
+            StatementKind::Let(s) => all.lets.push(s),
+            StatementKind::Param(s) => all.params.push(s),
+            StatementKind::Function(s) => all.functions.push(s),
+            StatementKind::Species(list) => all.species.extend(list),
+            StatementKind::Reaction(s) => all.reactions.push((span, s)),
+            StatementKind::Domain(s) => all.domain = Some((span, s)),
+            StatementKind::Boundary(s) => all.boundaries.push(s),
+            StatementKind::Flow(s) => all.flow = Some((span, s)),
+            StatementKind::Dispersion(s) => all.dispersion = Some((span, s)),
+            StatementKind::MixingZones(s) => all.zones = Some((span, s)),
+            StatementKind::Average(s) => all.average = Some((span, s)),
+            StatementKind::Initial(list) => all.initials.extend(list),
+            StatementKind::Particles(s) => all.particles = Some((span, s)),
+            StatementKind::Run(s) => all.run = Some((span, s)),
+            StatementKind::Output(s) => all.outputs.push((span, s)),
+            StatementKind::Reference(s) => all.references.push((span, s)),
+            StatementKind::Measure(s) => all.measures.push((span, s)),
+        }
+    }
+    all
+}
+
+/// The keyword of a statement that may stand once only.
+fn single(kind: &StatementKind) -> Option<&'static str> {
+    Some(match kind {
+        StatementKind::Title(_) => "title",
+        StatementKind::Seed(_) => "seed",
+        StatementKind::Domain(_) => "domain",
+        StatementKind::Flow(_) => "flow",
+        StatementKind::Dispersion(_) => "dispersion",
+        StatementKind::MixingZones(_) => "mixing zones",
+        StatementKind::Average(_) => "average",
+        StatementKind::Particles(_) => "particles",
+        StatementKind::Run(_) => "run",
+        _ => return None,
+    })
+}
+
+fn define_names<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>, overrides: &'a [tree::Param]) {
+    let axes: Vec<String> = checker.axes.iter().map(|(name, _)| name.clone()).collect();
+    let (scope, diagnostics) = (&mut checker.scope, &mut checker.diagnostics);
+    for statement in &statements.lets {
+        scope.define(&statement.name, Origin::Let(statement), &axes, diagnostics);
+    }
+    for statement in &statements.params {
+        let replaced = overrides.iter().rev().find(|param| param.name.value == statement.name.value);
+        scope.define(&statement.name, Origin::Param(replaced.unwrap_or(statement)), &axes, diagnostics);
+    }
+    for statement in &statements.functions {
+        scope.define(&statement.name, Origin::Function(statement), &axes, diagnostics);
+        report_twice_named_parameters(statement, diagnostics);
+    }
+    for (idx, statement) in statements.species.iter().enumerate() {
+        scope.define(&statement.name, Origin::Species(idx), &axes, diagnostics);
+    }
+    for (_, statement) in &statements.reactions {
+        if let Some(name) = &statement.name {
+            scope.define(name, Origin::Reaction, &axes, diagnostics);
+        }
+    }
+    for (idx, (_, statement)) in statements.references.iter().enumerate() {
+        if let Some(name) = super::reference::reference_name(statement) {
+            scope.define(name, Origin::Reference(idx), &axes, diagnostics);
+        }
+    }
+    for (_, statement) in &statements.measures {
+        scope.define(&statement.name, Origin::Measure, &axes, diagnostics);
+    }
+}
+
+fn report_twice_named_parameters(statement: &tree::Function, diagnostics: &mut Vec<Diagnostic>) {
+    for (idx, name) in statement.parameters.iter().enumerate() {
+        if let Some(first) = statement.parameters[..idx].iter().find(|first| first.value == name.value) {
+            diagnostics.push(
+                Diagnostic::error(D001, format!("two parameters are called `{}`", name.value))
+                    .at(name.span, "here again")
+                    .also(first.span, "first here")
+                    .found("one name twice")
+                    .expected("different names"),
+            );
+        }
+    }
+}
+
+fn build<'a>(
+    checker: &mut Checker<'a>,
+    statements: &Statements<'a>,
+    settings: &Settings,
+    file: &'a tree::File,
+    has_syntax_errors: bool,
+) -> Option<Scenario> {
+    if !has_syntax_errors {
+        report_missing(checker, statements, file);
+    }
+    let parameters = parameters(checker, statements);
+    let domain = super::geometry::domain(checker, statements);
+    let species = super::model::species(checker, statements);
+    let reactions = super::model::reactions(checker, statements, &species);
+    let flow = super::geometry::flow(checker, statements);
+    let dispersion = super::geometry::dispersion(checker, statements);
+    let mixing = super::model::mixing(checker, statements);
+    let bins = super::geometry::bins(checker, statements);
+    let particles = super::model::particles(checker, statements);
+    let run = super::model::run(checker, statements);
+    let duration = run.as_ref().map(|run| run.duration);
+    let (outputs, are_outputs_right) = super::observe::outputs(checker, statements, duration, bins.as_ref().and_then(Option::as_ref));
+    let (references, are_references_right) = super::reference::references(checker, statements, &outputs);
+    let (measures, are_measures_right) =
+        super::measure::measures(checker, statements, &outputs, &references, duration);
+    if !(are_outputs_right && are_references_right && are_measures_right) {
+        return None;
+    }
+    Some(Scenario {
+        title: statements.title.map(|title| title.value.clone()),
+        citations: statements.citations.iter().map(|text| text.value.clone()).collect(),
+        parameters,
+        species: species.all_right()?,
+        reactions: reactions?,
+        domain: domain?,
+        flow: flow?,
+        dispersion: dispersion?,
+        mixing: mixing?,
+        bins: bins?,
+        particles: particles?,
+        run: run?,
+        seed: settings.seed.or(statements.seed).unwrap_or(1),
+        outputs,
+        references,
+        measures,
+    })
+}
+
+fn report_missing<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>, file: &'a tree::File) {
+    let end = file.tokens.last().map_or(0, |token| token.span.end as usize);
+    let place = Span::new(file.file, end, end);
+    let wanted = [
+        (statements.species.is_empty(), "species", "species A \"tracer\""),
+        (statements.domain.is_none(), "domain", "domain line x = 0 m .. 1 m"),
+        (statements.particles.is_none(), "particles", "particles fluid 100_000 stratified"),
+        (statements.run.is_none(), "run", "run to 1 d, step 1 min"),
+    ];
+    for (is_missing, keyword, example) in wanted {
+        if is_missing {
+            checker.report(
+                Diagnostic::error(M001, format!("the scene has no `{keyword}` statement"))
+                    .at(place, "the scene ends here")
+                    .found(format!("no `{keyword}`"))
+                    .expected(format!("one `{keyword}` statement"))
+                    .help(format!("add for example `{example}`")),
+            );
+        }
+    }
+}
+
+fn parameters<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> Vec<Parameter> {
+    for statement in &statements.lets {
+        checker.constant_of(&statement.name.value);
+    }
+    let mut list = Vec::new();
+    for statement in &statements.params {
+        let name = &statement.name.value;
+        let value = checker.constant_of(name);
+        let dimension = value.and_then(|(_, kind)| match kind {
+            Type::Number(dimension) => Some(dimension),
+            _ => None,
+        });
+        let range = statement.range.as_ref().and_then(|range| {
+            checker.range(range, &format!("the range of `{name}`"), dimension)
+        });
+        let Some((value, _)) = value else { continue };
+        if let Some((low, high, _)) = range
+            && !(low.value..=high.value).contains(&value)
+        {
+            let span = match checker.scope.get(name).map(|entry| entry.origin) {
+                Some(Origin::Param(set)) => set.value.span,
+                _ => statement.value.span,
+            };
+            checker.report(
+                Diagnostic::error(P002, format!("`{name}` lies outside of its range"))
+                    .at(span, "this value")
+                    .also(low.span.to(high.span), "this range")
+                    .found(format!("{value} (SI)"))
+                    .expected(format!("{} to {} (SI)", low.value, high.value)),
+            );
+        }
+        list.push(Parameter {
+            name: name.clone(),
+            value,
+            dimension: dimension.or(range.map(|(_, _, dimension)| dimension)).unwrap_or_default(),
+            doc: statement.doc.as_ref().map(|doc| doc.value.clone()),
+            span: statement.name.span,
+        });
+    }
+    list
+}
+
+fn report_unused(scope: &Scope<'_>, diagnostics: &mut Vec<Diagnostic>) {
+    for (name, entry) in scope.iter() {
+        let is_constant = matches!(entry.origin, Origin::Let(_) | Origin::Param(_) | Origin::Function(_));
+        if is_constant && entry.n_uses == 0 && !matches!(entry.progress, Progress::Wrong) {
+            diagnostics.push(
+                Diagnostic::warning(D010, format!("`{name}` is never used"))
+                    .at(entry.span, format!("{} without effect", entry.origin.describe()))
+                    .help("delete it, or use it"),
+            );
+        }
+    }
+}
+
+/// `--set name=value`: each becomes a parameter with a source of its own.
+fn read_overrides(
+    file: &tree::File,
+    sources: &mut Sources,
+    settings: &Settings,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Vec<tree::Param> {
+    let params: Vec<&tree::Param> = file
+        .statements
+        .iter()
+        .filter_map(|statement| match &statement.kind {
+            StatementKind::Param(param) => Some(param),
+            _ => None,
+        })
+        .collect();
+    let mut overrides = Vec::new();
+    for (name, value) in &settings.set {
+        let text = format!("lamella 1\nlet {name} = {value}\n");
+        let id = sources.add(format!("--set {name}={value}"), text.clone());
+        let place = Span::new(id, "lamella 1\nlet ".len(), text.len() - 1);
+        let Some(param) = params.iter().find(|param| param.name.value == *name) else {
+            diagnostics.push(unknown_parameter(name, place, &params));
+            continue;
+        };
+        let (parsed, errors) = crate::syntax::parse(id, &text);
+        let value = parsed.statements.into_iter().find_map(|statement| match statement.kind {
+            StatementKind::Let(statement) => Some(statement.value),
+            _ => None,
+        });
+        diagnostics.extend(errors);
+        if let Some(value) = value {
+            overrides.push(tree::Param { value, ..(*param).clone() });
+        }
+    }
+    overrides
+}
+
+fn unknown_parameter(name: &str, place: Span, params: &[&tree::Param]) -> Diagnostic {
+    let names: Vec<&str> = params.iter().map(|param| param.name.value.as_str()).collect();
+    let mut message = Diagnostic::error(P001, format!("the scene has no parameter `{name}`"))
+        .at(place, "set on the command line")
+        .found(format!("`{name}`"))
+        .expected(if names.is_empty() { "no setting: the scene has no `param`".into() } else { names.join(", ") });
+    if let Some(candidate) = did_you_mean(name, names.iter().copied()) {
+        message = message.help(format!("did you mean `{candidate}`?"));
+    }
+    message
+}

@@ -1,0 +1,131 @@
+//! Resolved expressions: names gone, units gone, dimensions known.
+//!
+//! Owns the typed tree and its construction with folding of constants. May use the words.
+//! It deliberately knows no names: `check` turns a written expression into this.
+
+use crate::maths::operator::{Binary, Unary};
+use crate::source::Span;
+use crate::units::Dimension;
+
+/// What kind of value an expression has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Type {
+    /// The literal `0`, which fits any dimension.
+    Zero,
+    Number(Dimension),
+    /// A condition.
+    Truth,
+}
+
+impl Type {
+    /// The dimension of a number; the literal zero counts as a plain number.
+    pub fn dimension(self) -> Option<Dimension> {
+        match self {
+            Type::Zero => Some(Dimension::NONE),
+            Type::Number(dimension) => Some(dimension),
+            Type::Truth => None,
+        }
+    }
+
+    /// The type of a sum, a comparison's sides or the branches of an `if`; `None` if they differ.
+    pub fn unify(self, other: Type) -> Option<Type> {
+        match (self, other) {
+            (Type::Zero, Type::Number(_)) => Some(other),
+            (Type::Number(_), Type::Zero) => Some(self),
+            _ => (self == other).then_some(self),
+        }
+    }
+
+    pub fn describe(self) -> String {
+        match self {
+            Type::Zero => "zero".to_owned(),
+            Type::Number(dimension) => dimension.describe(),
+            Type::Truth => "a condition".to_owned(),
+        }
+    }
+}
+
+/// A typed expression; all values in SI.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Expr {
+    pub span: Span,
+    pub kind: Type,
+    pub node: Node,
+    /// Number of nodes, to bound what nested functions can grow to.
+    pub size: u32,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum Node {
+    Constant(f64),
+    /// Coordinate 0, 1, 2 for x, y, z.
+    Axis(usize),
+    Time,
+    /// The initial concentration of a species.
+    Species(usize),
+    Unary(Unary, Box<Expr>),
+    Binary(Binary, Box<Expr>, Box<Expr>),
+    Select(Box<Expr>, Box<Expr>, Box<Expr>),
+}
+
+impl Expr {
+    pub fn constant(value: f64, kind: Type, span: Span) -> Self {
+        Self { span, kind, node: Node::Constant(value), size: 1 }
+    }
+
+    pub fn leaf(node: Node, dimension: Dimension, span: Span) -> Self {
+        Self { span, kind: Type::Number(dimension), node, size: 1 }
+    }
+
+    /// The value, if the expression is a constant.
+    pub fn value(&self) -> Option<f64> {
+        match self.node {
+            Node::Constant(value) => Some(value),
+            _ => None,
+        }
+    }
+
+    pub fn unary(operator: Unary, a: Expr, kind: Type, span: Span) -> Self {
+        if let Some(value) = a.value() {
+            return Self::constant(operator.apply(value), kind, span);
+        }
+        let size = a.size.saturating_add(1);
+        Self { span, kind, node: Node::Unary(operator, Box::new(a)), size }
+    }
+
+    pub fn binary(operator: Binary, a: Expr, b: Expr, kind: Type, span: Span) -> Self {
+        if let (Some(left), Some(right)) = (a.value(), b.value()) {
+            return Self::constant(operator.apply(left, right), kind, span);
+        }
+        let size = a.size.saturating_add(b.size).saturating_add(1);
+        Self { span, kind, node: Node::Binary(operator, Box::new(a), Box::new(b)), size }
+    }
+
+    pub fn select(condition: Expr, then: Expr, otherwise: Expr, kind: Type, span: Span) -> Self {
+        if let Some(value) = condition.value() {
+            let chosen = if value != 0.0 { then } else { otherwise };
+            return Self { span, kind, ..chosen };
+        }
+        let size = condition.size.saturating_add(then.size).saturating_add(otherwise.size).saturating_add(1);
+        let node = Node::Select(Box::new(condition), Box::new(then), Box::new(otherwise));
+        Self { span, kind, node, size }
+    }
+
+    /// Calls `visit` on this expression and everything below it.
+    pub fn walk(&self, visit: &mut impl FnMut(&Expr)) {
+        visit(self);
+        match &self.node {
+            Node::Constant(_) | Node::Axis(_) | Node::Time | Node::Species(_) => {}
+            Node::Unary(_, a) => a.walk(visit),
+            Node::Binary(_, a, b) => {
+                a.walk(visit);
+                b.walk(visit);
+            }
+            Node::Select(a, b, c) => {
+                a.walk(visit);
+                b.walk(visit);
+                c.walk(visit);
+            }
+        }
+    }
+}

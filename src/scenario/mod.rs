@@ -1,0 +1,215 @@
+//! The scenario: what a scene means. Names resolved, dimensions checked, everything in SI.
+//!
+//! Owns the resolved types and the phase that builds them from the tree. May use the words, the
+//! catalogue and `syntax`. It deliberately decides nothing numerical: `plan` does.
+
+mod check;
+mod collect;
+pub mod expression;
+mod geometry;
+mod measure;
+mod model;
+mod observe;
+mod reference;
+mod scope;
+mod slot;
+
+use crate::source::{Span, Spanned};
+use crate::units::Dimension;
+use expression::Expr;
+
+pub use collect::resolve;
+pub use measure::{Fact, Field, FieldTarget, Norm, Scalar};
+
+/// What the command line adds to a scene.
+#[derive(Debug, Clone, Default)]
+pub struct Settings {
+    /// `--set name=value`, in order.
+    pub set: Vec<(String, String)>,
+    /// `--seed`
+    pub seed: Option<u64>,
+}
+
+/// A whole scene, resolved.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Scenario {
+    pub title: Option<String>,
+    pub citations: Vec<String>,
+    pub parameters: Vec<Parameter>,
+    pub species: Vec<Species>,
+    pub reactions: Vec<Reaction>,
+    pub domain: Domain,
+    /// Velocity in the resting frame, m/s; absent without a `flow` statement.
+    pub flow: Option<Spanned<[f64; 3]>>,
+    /// Dispersion tensor, m²/s; absent without a `dispersion` statement.
+    pub dispersion: Option<Spanned<[[f64; 3]; 3]>>,
+    pub mixing: Option<Mixing>,
+    /// Bins of the averages, one count per axis of the domain.
+    pub bins: Option<Spanned<Vec<usize>>>,
+    pub particles: Particles,
+    pub run: Run,
+    pub seed: u64,
+    pub outputs: Vec<Output>,
+    pub references: Vec<Reference>,
+    pub measures: Vec<Measure>,
+}
+
+/// A parameter as it was set, for the record of the run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Parameter {
+    pub name: String,
+    pub value: f64,
+    pub dimension: Dimension,
+    pub doc: Option<String>,
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Species {
+    pub name: String,
+    pub doc: Option<String>,
+    pub span: Span,
+    /// Amount (mol/m³) or mass (kg/m³).
+    pub dimension: Dimension,
+    /// Initial concentration over x, y, z; may refer to other species' initial concentrations.
+    pub initial: Expr,
+}
+
+/// A complete, irreversible reaction (`@ instant`).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reaction {
+    pub name: String,
+    pub span: Span,
+    /// `(species, ν > 0)`
+    pub reactants: Vec<(usize, f64)>,
+    pub products: Vec<(usize, f64)>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Domain {
+    pub span: Span,
+    pub axes: Vec<Axis>,
+    /// Velocity of the frame, m/s; zero for a resting one.
+    pub frame: [f64; 3],
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Axis {
+    /// 0, 1, 2 for x, y, z.
+    pub index: usize,
+    pub low: f64,
+    pub high: f64,
+    pub low_side: Side,
+    pub high_side: Side,
+    pub span: Span,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    Reflect,
+    Periodic,
+    Open,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mixing {
+    pub span: Span,
+    pub zones: Vec<Zone>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Zone {
+    pub name: String,
+    pub span: Span,
+    pub fraction: f64,
+    /// χ in 1/s; `None` is instant.
+    pub rate: Option<f64>,
+    pub rate_span: Span,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Particles {
+    pub span: Span,
+    pub count: u64,
+    pub count_span: Span,
+    pub placement: Placement,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Placement {
+    Random,
+    Stratified,
+    Ordered,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    pub span: Span,
+    pub duration: f64,
+    pub step: f64,
+    pub step_span: Span,
+    pub are_normals_double: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum OutputKind {
+    Profile,
+    Covariance,
+    Map,
+    Total,
+    Mixing,
+    Particles,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Output {
+    pub span: Span,
+    pub kind: OutputKind,
+    /// Species of the list; for pairs the pairs are made from it.
+    pub species: Vec<usize>,
+    pub pairs: Vec<(usize, usize)>,
+    pub times: Vec<f64>,
+    /// Axis index (0, 1, 2) of a profile or covariance.
+    pub along: Option<usize>,
+    /// Bins per axis of the domain; empty where nothing is binned.
+    pub bins: Vec<usize>,
+    pub bins_span: Span,
+    /// Unit text and factor to SI.
+    pub unit: Option<(String, f64)>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Reference {
+    pub name: String,
+    pub span: Span,
+    pub target: Target,
+    pub solution: Solution,
+}
+
+/// What a reference predicts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Target {
+    Concentration(usize),
+    Covariance(usize, usize),
+    Mixing(usize, usize),
+    Total(usize),
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum Solution {
+    /// Over x, y, z and t.
+    Expression(Expr),
+    /// Item of the catalogue with its SI arguments in order.
+    Catalogue { name: &'static str, arguments: Vec<f64> },
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Measure {
+    pub name: String,
+    pub span: Span,
+    pub value: Scalar,
+    pub over: Option<(usize, f64, f64)>,
+    pub times: Option<Vec<f64>>,
+    pub dimension: Dimension,
+    pub doc: Option<String>,
+}

@@ -1,0 +1,158 @@
+//! Names of a scene: each has one origin, whatever the order of statements.
+
+use super::expression::{Expr, Type};
+use crate::diagnostic::codes::{D002, D003, D004};
+use crate::diagnostic::{Diagnostic, did_you_mean};
+use crate::source::Span;
+use crate::syntax::tree;
+use std::collections::BTreeMap;
+
+/// Where a name comes from.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Origin<'a> {
+    Let(&'a tree::Let),
+    Param(&'a tree::Param),
+    Function(&'a tree::Function),
+    Species(usize),
+    Reaction,
+    Reference(usize),
+    Measure,
+}
+
+impl Origin<'_> {
+    pub(super) fn describe(self) -> &'static str {
+        match self {
+            Origin::Let(_) => "a constant",
+            Origin::Param(_) => "a parameter",
+            Origin::Function(_) => "a function",
+            Origin::Species(_) => "a species",
+            Origin::Reaction => "a reaction",
+            Origin::Reference(_) => "a reference",
+            Origin::Measure => "a measure",
+        }
+    }
+}
+
+/// How far the value of a constant has been worked out.
+#[derive(Debug, Clone)]
+pub(super) enum Progress {
+    Untouched,
+    Running,
+    Known(f64, Type),
+    /// Already reported.
+    Wrong,
+}
+
+#[derive(Debug)]
+pub(super) struct Entry<'a> {
+    pub origin: Origin<'a>,
+    pub span: Span,
+    pub progress: Progress,
+    pub n_uses: usize,
+}
+
+/// All names of a scene.
+#[derive(Debug, Default)]
+pub(super) struct Scope<'a> {
+    entries: BTreeMap<String, Entry<'a>>,
+    /// Undefined names and where they were met first; reported once each.
+    undefined: BTreeMap<String, (Span, usize)>,
+}
+
+/// Names that the language itself gives a meaning.
+pub(super) const BUILT_IN_FUNCTIONS: &[&str] = &[
+    "exp", "ln", "log10", "sqrt", "abs", "min", "max", "tanh", "erf", "erfc", "sin", "cos", "pow", "l1",
+    "l2", "linf", "rmse", "integral", "mean", "minimum", "maximum",
+];
+const RESERVED: &[(&str, &str)] = &[("t", "the time"), ("pi", "the number π"), ("instant", "a rate")];
+
+impl<'a> Scope<'a> {
+    /// Adds a name, or reports that it is taken.
+    pub(super) fn define(
+        &mut self,
+        name: &tree::Name,
+        origin: Origin<'a>,
+        axes: &[String],
+        diagnostics: &mut Vec<Diagnostic>,
+    ) {
+        let text = name.value.as_str();
+        if let Some(meaning) = reserved_meaning(text, axes) {
+            diagnostics.push(
+                Diagnostic::error(D003, format!("`{text}` already means {meaning}"))
+                    .at(name.span, "choose another name")
+                    .found(format!("`{text}`"))
+                    .expected("a name of your own"),
+            );
+            return;
+        }
+        if let Some(first) = self.entries.get(text) {
+            diagnostics.push(
+                Diagnostic::error(D002, format!("`{text}` is defined twice"))
+                    .at(name.span, format!("here again, as {}", origin.describe()))
+                    .also(first.span, format!("first defined here, as {}", first.origin.describe()))
+                    .found("a second definition")
+                    .expected("one definition of each name")
+                    .help("rename one of the two, or delete it"),
+            );
+            return;
+        }
+        let entry = Entry { origin, span: name.span, progress: Progress::Untouched, n_uses: 0 };
+        self.entries.insert(text.to_owned(), entry);
+    }
+
+    pub(super) fn get_mut(&mut self, name: &str) -> Option<&mut Entry<'a>> {
+        self.entries.get_mut(name)
+    }
+
+    pub(super) fn get(&self, name: &str) -> Option<&Entry<'a>> {
+        self.entries.get(name)
+    }
+
+    pub(super) fn iter(&self) -> impl Iterator<Item = (&String, &Entry<'a>)> {
+        self.entries.iter()
+    }
+
+    /// Notes a use of a name that does not exist; [`Scope::report_undefined`] tells it.
+    pub(super) fn note_undefined(&mut self, name: &str, span: Span) {
+        self.undefined.entry(name.to_owned()).or_insert((span, 0)).1 += 1;
+    }
+
+    /// One message per undefined name, at its first use.
+    pub(super) fn report_undefined(&self, axes: &[String], diagnostics: &mut Vec<Diagnostic>) {
+        for (name, (span, n_uses)) in &self.undefined {
+            let mut message = Diagnostic::error(D004, format!("`{name}` is not defined"))
+                .at(*span, "no such name")
+                .found(format!("`{name}`"))
+                .expected("a name that the scene defines");
+            if *n_uses > 1 {
+                message = message.note(format!("it is used in {} more places", n_uses - 1));
+            }
+            let names = self.entries.keys().map(String::as_str);
+            let candidates = names.chain(BUILT_IN_FUNCTIONS.iter().copied()).chain(axes.iter().map(String::as_str));
+            if let Some(candidate) = did_you_mean(name, candidates) {
+                message = message.help(format!("did you mean `{candidate}`?"));
+                if let Some(entry) = self.entries.get(candidate) {
+                    message = message.also(entry.span, format!("`{candidate}` is defined here"));
+                }
+            }
+            if ["x", "y", "z"].contains(&name.as_str()) {
+                message = message.note(format!("the domain has no axis `{name}`"));
+            }
+            diagnostics.push(message);
+        }
+    }
+}
+
+/// What a name means before any scene speaks.
+fn reserved_meaning(name: &str, axes: &[String]) -> Option<String> {
+    if let Some((_, meaning)) = RESERVED.iter().find(|(reserved, _)| *reserved == name) {
+        return Some((*meaning).to_owned());
+    }
+    if axes.iter().any(|axis| axis == name) {
+        return Some(format!("the coordinate along axis `{name}` of the domain"));
+    }
+    BUILT_IN_FUNCTIONS.contains(&name).then(|| format!("the built-in function `{name}`"))
+}
+
+/// The values that a function's parameters have while its body is checked.
+pub(super) type Locals = Vec<(String, Expr)>;
