@@ -1,0 +1,89 @@
+//! Expressions to tapes: shared sub-expressions once, constants already folded.
+
+use super::tape::{Operation, Register, Tape};
+use crate::scenario::Species;
+use crate::scenario::expression::{Expr, Node};
+use std::collections::BTreeMap;
+
+/// Column of x, y, z among the inputs of a tape; time follows.
+pub const TIME_INPUT: u16 = 3;
+
+/// Longest tape: registers are 16-bit numbers.
+const MAX_OPERATIONS: usize = 65_000;
+
+/// Compiles an expression over x, y, z, t; names of species stand for their initial
+/// concentrations. `None` if it needs more operations than a tape can hold.
+pub fn build_tape(expr: &Expr, species: &[Species]) -> Option<Tape> {
+    let mut builder = Builder { operations: Vec::new(), known: BTreeMap::new(), species };
+    let result = builder.add_expr(expr)?;
+    if usize::from(result) + 1 != builder.operations.len() {
+        // The last register is the result: repeat a shared one at the end.
+        let operation = builder.operations[usize::from(result)];
+        builder.operations.push(operation);
+    }
+    Some(Tape { operations: builder.operations })
+}
+
+struct Builder<'s> {
+    operations: Vec<Operation>,
+    known: BTreeMap<Key, Register>,
+    species: &'s [Species],
+}
+
+/// An operation with the bits of its constant, so that equal ones are found.
+#[derive(PartialEq, Eq, PartialOrd, Ord)]
+enum Key {
+    Constant(u64),
+    Input(u16),
+    Unary(crate::maths::operator::Unary, Register),
+    Binary(crate::maths::operator::Binary, Register, Register),
+    Select(Register, Register, Register),
+}
+
+impl Builder<'_> {
+    fn add_expr(&mut self, expr: &Expr) -> Option<Register> {
+        match &expr.node {
+            Node::Constant(value) => self.add(Operation::Constant(*value)),
+            Node::Axis(index) => self.add(Operation::Input(u16::try_from(*index).ok()?)),
+            Node::Time => self.add(Operation::Input(TIME_INPUT)),
+            Node::Species(idx) => {
+                // Initial concentrations have no circles: `scenario` refused them.
+                let species = self.species;
+                self.add_expr(&species[*idx].initial)
+            }
+            Node::Unary(operator, a) => {
+                let a = self.add_expr(a)?;
+                self.add(Operation::Unary(*operator, a))
+            }
+            Node::Binary(operator, a, b) => {
+                let (a, b) = (self.add_expr(a)?, self.add_expr(b)?);
+                self.add(Operation::Binary(*operator, a, b))
+            }
+            Node::Select(condition, then, otherwise) => {
+                let condition = self.add_expr(condition)?;
+                let (then, otherwise) = (self.add_expr(then)?, self.add_expr(otherwise)?);
+                self.add(Operation::Select(condition, then, otherwise))
+            }
+        }
+    }
+
+    fn add(&mut self, operation: Operation) -> Option<Register> {
+        let key = match operation {
+            Operation::Constant(value) => Key::Constant(value.to_bits()),
+            Operation::Input(column) => Key::Input(column),
+            Operation::Unary(operator, a) => Key::Unary(operator, a),
+            Operation::Binary(operator, a, b) => Key::Binary(operator, a, b),
+            Operation::Select(a, b, c) => Key::Select(a, b, c),
+        };
+        if let Some(register) = self.known.get(&key) {
+            return Some(*register);
+        }
+        if self.operations.len() >= MAX_OPERATIONS {
+            return None;
+        }
+        let register = self.operations.len() as Register;
+        self.operations.push(operation);
+        self.known.insert(key, register);
+        Some(register)
+    }
+}

@@ -1,0 +1,277 @@
+//! Scenario to plan, literally: everything the scene says, nothing left out yet.
+
+use super::build_tape::build_tape;
+use super::evaluation::{self, Evaluation};
+use super::{
+    Axis, Component, InstantReaction, Mixing, NUMERICS_VERSION, Normals, Output, OutputKind, OutputUnit, Particles,
+    Placement, Plan, Quantity, Side, Species, Stage, Time, Walk, Zone, ZoneRate,
+};
+use crate::diagnostic::Diagnostic;
+use crate::diagnostic::codes::D008;
+use crate::scenario::{self, Scenario};
+use crate::units::Dimension;
+
+/// Lowers a scenario; the diagnostics tell of expressions that are too large for a tape.
+pub fn lower(scenario: &Scenario) -> Result<(Plan, Evaluation), Vec<Diagnostic>> {
+    let mut problems = Vec::new();
+    let components = components(scenario, &mut problems);
+    let evaluation = evaluation(scenario, &mut problems);
+    if !problems.is_empty() {
+        return Err(problems);
+    }
+    let n_axes = scenario.domain.axes.len();
+    let bins = scenario.bins.as_ref().map_or_else(|| vec![1; n_axes], |bins| bins.value.clone());
+    let axes: Vec<Axis> = scenario.domain.axes.iter().zip(bins).map(|(axis, bins)| lower_axis(axis, bins)).collect();
+    let volume: f64 = axes.iter().map(|axis| axis.high - axis.low).product();
+    let plan = Plan {
+        numerics: NUMERICS_VERSION,
+        walk: walk(scenario),
+        particles: Particles {
+            count: scenario.particles.count,
+            placement: match scenario.particles.placement {
+                scenario::Placement::Random => Placement::Random,
+                scenario::Placement::Stratified => Placement::Stratified,
+                scenario::Placement::Ordered => Placement::Ordered,
+            },
+            volume: volume / scenario.particles.count as f64,
+        },
+        species: scenario.species.iter().enumerate().map(|(idx, species)| lower_species(idx, species)).collect(),
+        components,
+        mixing: scenario.mixing.as_ref().map(lower_mixing),
+        reactions: scenario.reactions.iter().map(lower_reaction).collect(),
+        time: time(scenario),
+        outputs: scenario.outputs.iter().map(lower_output).collect(),
+        stages: vec![Stage::Mix, Stage::Move, Stage::Bound, Stage::Average, Stage::Observe],
+        seed: scenario.seed,
+        axes,
+    };
+    Ok((plan, evaluation))
+}
+
+fn lower_axis(axis: &scenario::Axis, bins: usize) -> Axis {
+    let side = |side| match side {
+        scenario::Side::Reflect => Side::Reflect,
+        scenario::Side::Periodic => Side::Periodic,
+        scenario::Side::Open => Side::Open,
+    };
+    Axis {
+        index: axis.index,
+        low: axis.low,
+        high: axis.high,
+        low_side: side(axis.low_side),
+        high_side: side(axis.high_side),
+        bins,
+    }
+}
+
+/// Drift in the frame and the Cholesky factor of 2 D over the axes of the domain.
+fn walk(scenario: &Scenario) -> Walk {
+    let velocity = scenario.flow.as_ref().map_or([0.0; 3], |flow| flow.value);
+    let tensor = scenario.dispersion.as_ref().map_or([[0.0; 3]; 3], |tensor| tensor.value);
+    let indices: Vec<usize> = scenario.domain.axes.iter().map(|axis| axis.index).collect();
+    let drift = indices.iter().map(|&index| velocity[index] - scenario.domain.frame[index]).collect();
+    let doubled: Vec<Vec<f64>> =
+        indices.iter().map(|&row| indices.iter().map(|&column| 2.0 * tensor[row][column]).collect()).collect();
+    let normals = if scenario.run.are_normals_double { Normals::Double } else { Normals::Single };
+    Walk { drift, spread: cholesky(&doubled), normals }
+}
+
+/// Lower triangle L, row by row, with L Lᵀ = A for a symmetric positive semi-definite A.
+///
+/// - Equation: `l_ij = (a_ij − Σ_{k<j} l_ik l_jk) / l_jj`, `l_ii = √(a_ii − Σ_{k<i} l_ik²)`.
+/// - Symbols: A = 2 D over the active axes.
+/// - Dimensions and range: m²/s to m/√s; a vanishing pivot gives a zero column.
+/// - Source: G. H. Golub, C. F. Van Loan, Matrix Computations, section 4.2.
+/// - Shape: n × n to n(n+1)/2 entries.
+pub(super) fn cholesky(a: &[Vec<f64>]) -> Vec<f64> {
+    let n = a.len();
+    let mut l = vec![vec![0.0; n]; n];
+    for i in 0..n {
+        for j in 0..=i {
+            let rest = a[i][j] - (0..j).map(|k| l[i][k] * l[j][k]).sum::<f64>();
+            l[i][j] = if i == j {
+                // Rounding may leave a tiny negative pivot of a singular tensor.
+                if rest > 1e-14 * a[i][i] { rest.sqrt() } else { 0.0 }
+            } else if l[j][j] > 0.0 {
+                rest / l[j][j]
+            } else {
+                0.0
+            };
+        }
+    }
+    (0..n).flat_map(|i| l[i][..=i].to_vec()).collect()
+}
+
+fn lower_species(idx: usize, species: &scenario::Species) -> Species {
+    Species {
+        name: species.name.clone(),
+        constant: 0.0,
+        terms: vec![(idx, 1.0)],
+        is_molar: species.dimension == Dimension::MOLAR_CONCENTRATION,
+    }
+}
+
+fn components(scenario: &Scenario, problems: &mut Vec<Diagnostic>) -> Vec<Component> {
+    let mut list = Vec::new();
+    for species in &scenario.species {
+        match build_tape(&species.initial, &scenario.species) {
+            Some(initial) => list.push(Component { name: species.name.clone(), initial }),
+            None => problems.push(too_large(species.initial.span)),
+        }
+    }
+    list
+}
+
+fn too_large(span: crate::source::Span) -> Diagnostic {
+    Diagnostic::error(D008, "this expression is too large")
+        .at(span, "more than 65,000 operations")
+        .found("more than 65,000 operations")
+        .expected("a smaller expression")
+}
+
+fn lower_mixing(mixing: &scenario::Mixing) -> Mixing {
+    let zone = |zone: &scenario::Zone| Zone {
+        name: zone.name.clone(),
+        fraction: zone.fraction,
+        rate: zone.rate.map_or(ZoneRate::Instant, ZoneRate::Finite),
+        is_stored: true,
+    };
+    Mixing {
+        zones: mixing.zones.iter().map(zone).collect(),
+        is_well_mixed: mixing.zones.iter().all(|zone| zone.rate.is_none()),
+    }
+}
+
+fn lower_reaction(reaction: &scenario::Reaction) -> InstantReaction {
+    InstantReaction {
+        name: reaction.name.clone(),
+        reactants: reaction.reactants.clone(),
+        products: reaction.products.clone(),
+    }
+}
+
+fn time(scenario: &Scenario) -> Time {
+    let (duration, step) = (scenario.run.duration, scenario.run.step);
+    let exact = duration / step;
+    // A duration that is a multiple up to rounding has no extra sliver of a step.
+    let n_steps = if (exact - exact.round()).abs() < 1e-9 * exact.max(1.0) { exact.round() } else { exact.ceil() };
+    Time { step, n_steps: (n_steps as u64).max(1), duration }
+}
+
+impl From<scenario::OutputKind> for OutputKind {
+    fn from(kind: scenario::OutputKind) -> Self {
+        match kind {
+            scenario::OutputKind::Profile => OutputKind::Profile,
+            scenario::OutputKind::Covariance => OutputKind::Covariance,
+            scenario::OutputKind::Map => OutputKind::Map,
+            scenario::OutputKind::Total => OutputKind::Total,
+            scenario::OutputKind::Mixing => OutputKind::Mixing,
+            scenario::OutputKind::Particles => OutputKind::Particles,
+        }
+    }
+}
+
+fn lower_output(output: &scenario::Output) -> Output {
+    let quantities = if output.kind.is_of_pairs() {
+        output.pairs.iter().map(|&(a, b)| Quantity::Pair(a, b)).collect()
+    } else {
+        output.species.iter().map(|&species| Quantity::Species(species)).collect()
+    };
+    Output {
+        kind: output.kind.into(),
+        quantities,
+        bins: output.bins.clone(),
+        times: output.times.clone(),
+        unit: output.unit.as_ref().map(|(text, factor)| OutputUnit { text: text.clone(), factor: *factor }),
+    }
+}
+
+fn evaluation(scenario: &Scenario, problems: &mut Vec<Diagnostic>) -> Evaluation {
+    let mut references = Vec::new();
+    for reference in &scenario.references {
+        let solution = match &reference.solution {
+            scenario::Solution::Catalogue { name, arguments } => {
+                evaluation::Solution::Catalogue { name: (*name).to_owned(), arguments: arguments.clone() }
+            }
+            scenario::Solution::Expression(expr) => match build_tape(expr, &scenario.species) {
+                Some(tape) => evaluation::Solution::Expression(tape),
+                None => {
+                    problems.push(too_large(reference.span));
+                    continue;
+                }
+            },
+        };
+        let target = match reference.target {
+            scenario::Target::Concentration(a) | scenario::Target::Total(a) => Quantity::Species(a),
+            scenario::Target::Covariance(a, b) | scenario::Target::Mixing(a, b) => Quantity::Pair(a, b),
+        };
+        let outputs = reference.target.outputs().iter().map(|kind| (*kind).into()).collect();
+        references.push(evaluation::Reference { name: reference.name.clone(), outputs, target, solution });
+    }
+    let measures = scenario.measures.iter().map(lower_measure).collect();
+    Evaluation { references, measures }
+}
+
+fn lower_measure(measure: &scenario::Measure) -> evaluation::Measure {
+    evaluation::Measure {
+        name: measure.name.clone(),
+        value: lower_scalar(&measure.value),
+        over: measure.over,
+        times: measure.times.clone(),
+        unit: measure.dimension.unit_text(),
+        doc: measure.doc.clone(),
+    }
+}
+
+fn lower_scalar(scalar: &scenario::Scalar) -> evaluation::Scalar {
+    use evaluation::Scalar as To;
+    use scenario::Scalar as From;
+    match scalar {
+        From::Number(value) => To::Number(*value),
+        From::Fact(fact) => To::Fact(match fact {
+            scenario::Fact::WallTime => evaluation::Fact::WallTime,
+            scenario::Fact::CpuTime => evaluation::Fact::CpuTime,
+            scenario::Fact::MassDefect => evaluation::Fact::MassDefect,
+            scenario::Fact::Particles => evaluation::Fact::Particles,
+            scenario::Fact::Steps => evaluation::Fact::Steps,
+        }),
+        From::Norm(norm, field) => To::Norm(lower_norm(*norm), Box::new(lower_field(field))),
+        From::Unary(operator, a) => To::Unary(*operator, Box::new(lower_scalar(a))),
+        From::Binary(operator, a, b) => {
+            To::Binary(*operator, Box::new(lower_scalar(a)), Box::new(lower_scalar(b)))
+        }
+    }
+}
+
+fn lower_norm(norm: scenario::Norm) -> evaluation::Norm {
+    match norm {
+        scenario::Norm::L1 => evaluation::Norm::L1,
+        scenario::Norm::L2 => evaluation::Norm::L2,
+        scenario::Norm::LInf => evaluation::Norm::LInf,
+        scenario::Norm::Rmse => evaluation::Norm::Rmse,
+        scenario::Norm::Integral => evaluation::Norm::Integral,
+        scenario::Norm::Mean => evaluation::Norm::Mean,
+        scenario::Norm::Minimum => evaluation::Norm::Minimum,
+        scenario::Norm::Maximum => evaluation::Norm::Maximum,
+    }
+}
+
+fn lower_field(field: &scenario::Field) -> evaluation::Field {
+    use evaluation::Field as To;
+    use scenario::Field as From;
+    match field {
+        From::Number(value) => To::Number(*value),
+        From::Output(kind, target) => {
+            let quantity = match *target {
+                scenario::FieldTarget::Species(a) => Quantity::Species(a),
+                scenario::FieldTarget::Pair(a, b) => Quantity::Pair(a, b),
+            };
+            To::Output((*kind).into(), quantity)
+        }
+        From::Reference(idx) => To::Reference(*idx),
+        From::Unary(operator, a) => To::Unary(*operator, Box::new(lower_field(a))),
+        From::Binary(operator, a, b) => {
+            To::Binary(*operator, Box::new(lower_field(a)), Box::new(lower_field(b)))
+        }
+    }
+}

@@ -1,0 +1,138 @@
+//! Liveness of species, backwards from the outputs: what nobody reads is neither carried nor reacted.
+
+use super::Draft;
+use crate::plan::evaluation::{Field, Scalar};
+use crate::plan::{Plan, Quantity};
+
+pub(super) fn run(draft: &mut Draft) {
+    let is_read = read_species(&draft.plan);
+    let names: Vec<String> = draft.plan.species.iter().map(|species| species.name.clone()).collect();
+    let dead: Vec<&str> =
+        names.iter().zip(&is_read).filter(|(_, is_read)| !**is_read).map(|(name, _)| name.as_str()).collect();
+    let is_live = |reaction: &crate::plan::InstantReaction| {
+        reaction.reactants.iter().chain(&reaction.products).any(|(species, _)| is_read[*species])
+    };
+    let idle: Vec<String> =
+        draft.plan.reactions.iter().filter(|r| !is_live(r)).map(|r| r.name.clone()).collect();
+    draft.plan.reactions.retain(is_live);
+    for name in idle {
+        draft.leave_out(format!("reaction `{name}`"), "no output reads any of its species");
+    }
+    if !dead.is_empty() {
+        let word = if dead.len() == 1 { "species" } else { "species " };
+        let list = dead.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
+        draft.leave_out(format!("{} {list}", word.trim()), "no output reads it, alone or through a reaction");
+    }
+    remove(draft, &is_read);
+}
+
+/// Species that outputs name, and the reactants of every reaction that touches one of these.
+fn read_species(plan: &Plan) -> Vec<bool> {
+    let mut is_read = vec![false; plan.species.len()];
+    for quantity in plan.outputs.iter().flat_map(|output| &output.quantities) {
+        match *quantity {
+            Quantity::Species(a) => is_read[a] = true,
+            Quantity::Pair(a, b) => {
+                is_read[a] = true;
+                is_read[b] = true;
+            }
+        }
+    }
+    loop {
+        let before = is_read.clone();
+        for reaction in &plan.reactions {
+            let touches = reaction.reactants.iter().chain(&reaction.products).any(|(species, _)| is_read[*species]);
+            if touches {
+                reaction.reactants.iter().for_each(|(species, _)| is_read[*species] = true);
+            }
+        }
+        if before == is_read {
+            return is_read;
+        }
+    }
+}
+
+/// Drops the species that are not read, with their components, and renumbers the rest.
+fn remove(draft: &mut Draft, is_read: &[bool]) {
+    let mut next = 0;
+    let renumbered: Vec<Option<usize>> = is_read
+        .iter()
+        .map(|is_read| {
+            let number = is_read.then_some(next);
+            next += usize::from(*is_read);
+            number
+        })
+        .collect();
+    let plan = &mut draft.plan;
+    retain_by(&mut plan.species, is_read);
+    let is_carried: Vec<bool> = (0..plan.components.len())
+        .map(|component| plan.species.iter().any(|species| species.terms.iter().any(|(idx, _)| *idx == component)))
+        .collect();
+    retain_by(&mut plan.components, &is_carried);
+    let new_component = |old: usize| is_carried[..old].iter().filter(|is_carried| **is_carried).count();
+    for species in &mut plan.species {
+        species.terms.iter_mut().for_each(|(component, _)| *component = new_component(*component));
+    }
+    let renumber = |list: &mut Vec<(usize, f64)>| {
+        *list = list.iter().filter_map(|(species, nu)| Some((renumbered[*species]?, *nu))).collect();
+    };
+    for reaction in &mut plan.reactions {
+        renumber(&mut reaction.reactants);
+        renumber(&mut reaction.products);
+    }
+    let quantity = |quantity: &mut Quantity| match quantity {
+        Quantity::Species(a) => *a = renumbered[*a].unwrap_or(0),
+        Quantity::Pair(a, b) => {
+            *a = renumbered[*a].unwrap_or(0);
+            *b = renumbered[*b].unwrap_or(0);
+        }
+    };
+    plan.outputs.iter_mut().flat_map(|output| &mut output.quantities).for_each(quantity);
+    renumber_evaluation(draft, &renumbered, &quantity);
+}
+
+/// References to species that nobody observes go; measures keep pointing at the right ones.
+fn renumber_evaluation(draft: &mut Draft, renumbered: &[Option<usize>], quantity: &impl Fn(&mut Quantity)) {
+    let lives = |target: &Quantity| match *target {
+        Quantity::Species(a) => renumbered[a].is_some(),
+        Quantity::Pair(a, b) => renumbered[a].is_some() && renumbered[b].is_some(),
+    };
+    let is_kept: Vec<bool> =
+        draft.evaluation.references.iter().map(|reference| lives(&reference.target)).collect();
+    retain_by(&mut draft.evaluation.references, &is_kept);
+    draft.evaluation.references.iter_mut().for_each(|reference| quantity(&mut reference.target));
+    // A measure can only name references that some output is compared with, so none is lost here.
+    for measure in &mut draft.evaluation.measures {
+        renumber_scalar(&mut measure.value, &is_kept, quantity);
+    }
+}
+
+fn renumber_scalar(scalar: &mut Scalar, is_kept: &[bool], quantity: &impl Fn(&mut Quantity)) {
+    match scalar {
+        Scalar::Number(_) | Scalar::Fact(_) => {}
+        Scalar::Norm(_, field) => renumber_field(field, is_kept, quantity),
+        Scalar::Unary(_, a) => renumber_scalar(a, is_kept, quantity),
+        Scalar::Binary(_, a, b) => {
+            renumber_scalar(a, is_kept, quantity);
+            renumber_scalar(b, is_kept, quantity);
+        }
+    }
+}
+
+fn renumber_field(field: &mut Field, is_kept: &[bool], quantity: &impl Fn(&mut Quantity)) {
+    match field {
+        Field::Number(_) => {}
+        Field::Output(_, target) => quantity(target),
+        Field::Reference(idx) => *idx = is_kept[..*idx].iter().filter(|is_kept| **is_kept).count(),
+        Field::Unary(_, a) => renumber_field(a, is_kept, quantity),
+        Field::Binary(_, a, b) => {
+            renumber_field(a, is_kept, quantity);
+            renumber_field(b, is_kept, quantity);
+        }
+    }
+}
+
+fn retain_by<T>(list: &mut Vec<T>, is_kept: &[bool]) {
+    let mut flags = is_kept.iter();
+    list.retain(|_| flags.next().copied().unwrap_or(true));
+}
