@@ -51,7 +51,9 @@ impl<'a> Checker<'a> {
         let checked = match &expr.kind {
             ExprKind::Number(number) => self.number(number, expr.span),
             ExprKind::Path(path) => self.path(path, expr.span, allow, locals),
-            ExprKind::Call { function, arguments } => self.call(function, arguments, expr.span, allow, locals),
+            ExprKind::Call { function, arguments } => {
+                self.call(function, arguments, expr.span, allow, locals)
+            }
             ExprKind::Unary { operator, operand } => {
                 let operand = self.check_with(operand, allow, locals)?;
                 self.unary(operator.value, operand, expr.span)
@@ -125,7 +127,8 @@ impl<'a> Checker<'a> {
             );
             return None;
         };
-        if value == 0.0 && number.digits.bytes().any(|b| (b'1'..=b'9').contains(&mantissa_byte(&number.digits, b)))
+        if value == 0.0
+            && number.digits.bytes().any(|b| (b'1'..=b'9').contains(&mantissa_byte(&number.digits, b)))
         {
             self.report(
                 Diagnostic::error(U106, "this number is too small")
@@ -136,7 +139,8 @@ impl<'a> Checker<'a> {
             return None;
         }
         self.note_unit_that_is_a_name(number, span);
-        let kind = if number.unit.is_none() && value == 0.0 { Type::Zero } else { Type::Number(unit.dimension) };
+        let kind =
+            if number.unit.is_none() && value == 0.0 { Type::Zero } else { Type::Number(unit.dimension) };
         Some(Expr::constant(value, kind, span))
     }
 
@@ -146,10 +150,13 @@ impl<'a> Checker<'a> {
         let Some(entry) = self.scope.get(name) else { return };
         let (origin, defined) = (entry.origin.describe(), entry.span);
         self.diagnostics.push(
-            Diagnostic::remark(U107, format!("`/{name}` after a number is the unit 1/{name}, not the name `{name}`"))
-                .at(span, format!("read as per {name}"))
-                .also(defined, format!("`{name}` is {origin} of this scene"))
-                .help(format!("for the name write `{} / {name}`, with a blank after the slash", number.digits)),
+            Diagnostic::remark(
+                U107,
+                format!("`/{name}` after a number is the unit 1/{name}, not the name `{name}`"),
+            )
+            .at(span, format!("read as per {name}"))
+            .also(defined, format!("`{name}` is {origin} of this scene"))
+            .help(format!("for the name write `{} / {name}`, with a blank after the slash", number.digits)),
         );
     }
 
@@ -204,7 +211,14 @@ impl<'a> Checker<'a> {
             return Some(Expr { span, ..value.clone() });
         }
         if let Some(&(_, index)) = self.axes.iter().find(|(axis, _)| axis == text) {
-            return self.variable(Node::Axis(index), Dimension::LENGTH, span, allow.position, text, "a position");
+            return self.variable(
+                Node::Axis(index),
+                Dimension::LENGTH,
+                span,
+                allow.position,
+                text,
+                "a position",
+            );
         }
         match text {
             "t" => return self.variable(Node::Time, Dimension::TIME, span, allow.time, text, "the time"),

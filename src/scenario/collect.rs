@@ -219,7 +219,8 @@ fn build<'a>(
     let particles = super::model::particles(checker, statements);
     let run = super::model::run(checker, statements);
     let duration = run.as_ref().map(|run| run.duration);
-    let (outputs, are_outputs_right) = super::observe::outputs(checker, statements, duration, bins.as_ref().and_then(Option::as_ref));
+    let (outputs, are_outputs_right) =
+        super::observe::outputs(checker, statements, duration, bins.as_ref().and_then(Option::as_ref));
     let (references, are_references_right) = super::reference::references(checker, statements, &outputs);
     let (measures, are_measures_right) =
         super::measure::measures(checker, statements, &outputs, &references, duration);
@@ -280,9 +281,10 @@ fn parameters<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> Vec
             Type::Number(dimension) => Some(dimension),
             _ => None,
         });
-        let range = statement.range.as_ref().and_then(|range| {
-            checker.range(range, &format!("the range of `{name}`"), dimension)
-        });
+        let range = statement
+            .range
+            .as_ref()
+            .and_then(|range| checker.range(range, &format!("the range of `{name}`"), dimension));
         let Some((value, _)) = value else { continue };
         if let Some((low, high, _)) = range
             && !(low.value..=high.value).contains(&value)
@@ -365,7 +367,11 @@ fn unknown_parameter(name: &str, place: Span, params: &[&tree::Param]) -> Diagno
     let mut message = Diagnostic::error(P001, format!("the scene has no parameter `{name}`"))
         .at(place, "set on the command line")
         .found(format!("`{name}`"))
-        .expected(if names.is_empty() { "no setting: the scene has no `param`".into() } else { names.join(", ") });
+        .expected(if names.is_empty() {
+            "no setting: the scene has no `param`".into()
+        } else {
+            names.join(", ")
+        });
     if let Some(candidate) = did_you_mean(name, names.iter().copied()) {
         message = message.help(format!("did you mean `{candidate}`?"));
     }

@@ -12,7 +12,8 @@ use crate::units::Dimension;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 const SHAPES: &[(&str, usize)] = &[("line", 1), ("rect", 2), ("box", 3)];
-const SIDES: &[(&str, Side)] = &[("reflect", Side::Reflect), ("open", Side::Open), ("periodic", Side::Periodic)];
+const SIDES: &[(&str, Side)] =
+    &[("reflect", Side::Reflect), ("open", Side::Open), ("periodic", Side::Periodic)];
 
 /// Bins along one axis, and in all.
 const MAX_BINS: f64 = 1e8;
@@ -33,8 +34,12 @@ pub(super) fn axis_names(statements: &Statements<'_>) -> Vec<(String, usize)> {
 pub(super) fn domain<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> Option<Domain> {
     let (span, statement) = statements.domain?;
     let n_axes = checker.word(&statement.shape, "a shape of a domain", SHAPES);
-    let axes: Vec<Option<Axis>> =
-        statement.axes.iter().enumerate().map(|(idx, axis)| read_axis(checker, statement, idx, axis)).collect();
+    let axes: Vec<Option<Axis>> = statement
+        .axes
+        .iter()
+        .enumerate()
+        .map(|(idx, axis)| read_axis(checker, statement, idx, axis))
+        .collect();
     let is_right_number = n_axes.is_none_or(|n| n == statement.axes.len());
     if !is_right_number {
         let n = n_axes.unwrap_or(0);
@@ -177,7 +182,12 @@ fn report_missing_sides(checker: &mut Checker<'_>, missing: &[&str], domain: &tr
     );
 }
 
-fn check_periodic(checker: &mut Checker<'_>, set: &[Option<(Side, Span)>; 2], axis: &Axis, names: [&str; 2]) -> bool {
+fn check_periodic(
+    checker: &mut Checker<'_>,
+    set: &[Option<(Side, Span)>; 2],
+    axis: &Axis,
+    names: [&str; 2],
+) -> bool {
     let [Some((low, low_span)), Some((high, high_span))] = *set else { return true };
     if (low == Side::Periodic) == (high == Side::Periodic) {
         return true;
@@ -319,6 +329,12 @@ pub(super) fn grid(
         return None;
     }
     let total: f64 = values.iter().map(|&count| count as f64).product();
-    checker.require(total <= MAX_BINS, "the number of bins in all", total.to_string(), "at most 1e8", place)?;
+    checker.require(
+        total <= MAX_BINS,
+        "the number of bins in all",
+        total.to_string(),
+        "at most 1e8",
+        place,
+    )?;
     Some(Spanned::new(values.into_iter().map(|count| count as usize).collect(), place))
 }

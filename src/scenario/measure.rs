@@ -226,7 +226,9 @@ fn path_part<'a>(
         output.kind == kind
             && match target {
                 Some(FieldTarget::Species(a)) => output.species.contains(&a),
-                Some(FieldTarget::Pair(a, b)) => output.pairs.contains(&(a, b)) || output.pairs.contains(&(b, a)),
+                Some(FieldTarget::Pair(a, b)) => {
+                    output.pairs.contains(&(a, b)) || output.pairs.contains(&(b, a))
+                }
                 None => false,
             }
     };

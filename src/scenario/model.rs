@@ -69,17 +69,23 @@ enum Initial {
 }
 
 /// The assignment of each species, if it has one.
-fn assignments<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> Vec<Option<&'a tree::Assignment>> {
+fn assignments<'a>(
+    checker: &mut Checker<'a>,
+    statements: &Statements<'a>,
+) -> Vec<Option<&'a tree::Assignment>> {
     let mut assigned: Vec<Option<&'a tree::Assignment>> = vec![None; statements.species.len()];
     for assignment in &statements.initials {
         let Some(idx) = species_index(checker, &assignment.name) else { continue };
         if let Some(first) = assigned[idx] {
             checker.report(
-                Diagnostic::error(D002, format!("`{}` has two initial concentrations", assignment.name.value))
-                    .at(assignment.name.span, "here again")
-                    .also(first.name.span, "first here")
-                    .found("a second initial concentration")
-                    .expected("one for each species"),
+                Diagnostic::error(
+                    D002,
+                    format!("`{}` has two initial concentrations", assignment.name.value),
+                )
+                .at(assignment.name.span, "here again")
+                .also(first.name.span, "first here")
+                .found("a second initial concentration")
+                .expected("one for each species"),
             );
             continue;
         }
@@ -122,10 +128,13 @@ fn initial_of<'a>(
             let name = &statements.species[idx].name;
             let place = assigned[idx].map_or(name.span, |assignment| assignment.name.span);
             checker.report(
-                Diagnostic::error(D006, format!("the initial concentration of `{}` needs itself", name.value))
-                    .at(place, "in a circle of definitions")
-                    .found("a circle")
-                    .expected("initial concentrations that end in numbers"),
+                Diagnostic::error(
+                    D006,
+                    format!("the initial concentration of `{}` needs itself", name.value),
+                )
+                .at(place, "in a circle of definitions")
+                .found("a circle")
+                .expected("initial concentrations that end in numbers"),
             );
             initials[idx] = Initial::Wrong;
             return;
@@ -180,7 +189,8 @@ fn spread_dimensions(checker: &mut Checker<'_>, statements: &Statements<'_>) {
                     _ => None,
                 })
                 .collect();
-            let known = members.iter().find_map(|(idx, place)| Some((checker.species_dimensions[*idx]?, *place)));
+            let known =
+                members.iter().find_map(|(idx, place)| Some((checker.species_dimensions[*idx]?, *place)));
             let Some((dimension, place)) = known else { continue };
             for (idx, own_place) in members {
                 let own = *checker.species_dimensions[idx].get_or_insert(dimension);
@@ -206,8 +216,12 @@ pub(super) fn reactions<'a>(
     species: &SpeciesList,
 ) -> Option<Vec<Reaction>> {
     debug_assert_eq!(species.list.len(), statements.species.len());
-    let all: Vec<Option<Reaction>> =
-        statements.reactions.iter().enumerate().map(|(idx, (span, written))| reaction(checker, idx, *span, written)).collect();
+    let all: Vec<Option<Reaction>> = statements
+        .reactions
+        .iter()
+        .enumerate()
+        .map(|(idx, (span, written))| reaction(checker, idx, *span, written))
+        .collect();
     let all: Vec<Reaction> = all.into_iter().collect::<Option<_>>()?;
     check_competition(checker, statements, &all)?;
     Some(all)
@@ -219,7 +233,8 @@ fn reaction<'a>(
     span: Span,
     written: &'a tree::Reaction,
 ) -> Option<Reaction> {
-    let name = written.name.as_ref().map_or_else(|| format!("reaction_{}", idx + 1), |name| name.value.clone());
+    let name =
+        written.name.as_ref().map_or_else(|| format!("reaction_{}", idx + 1), |name| name.value.clone());
     let reactants = side(checker, &written.reactants);
     let products = side(checker, &written.products);
     check_instant(checker, written)?;
@@ -238,7 +253,8 @@ fn reaction<'a>(
 
 /// Only complete instant reactions run in this edition.
 fn check_instant(checker: &mut Checker<'_>, written: &tree::Reaction) -> Option<()> {
-    let is_instant = matches!(&written.rate.kind, ExprKind::Path(path) if path.len() == 1 && path[0].value == "instant");
+    let is_instant =
+        matches!(&written.rate.kind, ExprKind::Path(path) if path.len() == 1 && path[0].value == "instant");
     if !is_instant {
         let found = match &written.rate.kind {
             ExprKind::Path(path) => path.iter().map(|name| name.value.as_str()).collect::<Vec<_>>().join("."),
@@ -276,7 +292,13 @@ fn side(checker: &mut Checker<'_>, terms: &[tree::Term]) -> Option<Vec<(usize, f
                 let value: f64 = digits.value.parse().unwrap_or(f64::NAN);
                 let is_fine = value > 0.0 && value.is_finite();
                 checker
-                    .require(is_fine, "a stoichiometric coefficient", digits.value.clone(), "above zero", digits.span)
+                    .require(
+                        is_fine,
+                        "a stoichiometric coefficient",
+                        digits.value.clone(),
+                        "above zero",
+                        digits.span,
+                    )
                     .map(|()| value)
             }
         };
@@ -297,7 +319,9 @@ fn check_competition(checker: &mut Checker<'_>, statements: &Statements<'_>, all
         for first in &all[..=second_idx] {
             let is_same = std::ptr::eq(first, second);
             let shares = |a: &[(usize, f64)], b: &[(usize, f64)]| {
-                a.iter().find(|(species, _)| b.iter().any(|(other, _)| other == species)).map(|(species, _)| *species)
+                a.iter()
+                    .find(|(species, _)| b.iter().any(|(other, _)| other == species))
+                    .map(|(species, _)| *species)
             };
             let shared = if is_same {
                 shares(&first.reactants, &first.products)
@@ -377,7 +401,8 @@ fn read_zone<'a>(checker: &mut Checker<'a>, zone: &'a tree::Zone) -> Option<Zone
     let mut rate = None;
     let mut is_right = true;
     for field in &zone.fields {
-        let Some(is_fraction) = checker.word(&field.name, "a property of a zone", &[("fraction", true), ("rate", false)])
+        let Some(is_fraction) =
+            checker.word(&field.name, "a property of a zone", &[("fraction", true), ("rate", false)])
         else {
             is_right = false;
             continue;
@@ -386,11 +411,14 @@ fn read_zone<'a>(checker: &mut Checker<'a>, zone: &'a tree::Zone) -> Option<Zone
         if let Some(first) = slot.replace(field) {
             let first: &tree::Field = first;
             checker.report(
-                Diagnostic::error(M002, format!("a second `{}` of zone `{}`", field.name.value, zone.name.value))
-                    .at(field.name.span, "here again")
-                    .also(first.name.span, "first here")
-                    .found("two")
-                    .expected("one"),
+                Diagnostic::error(
+                    M002,
+                    format!("a second `{}` of zone `{}`", field.name.value, zone.name.value),
+                )
+                .at(field.name.span, "here again")
+                .also(first.name.span, "first here")
+                .found("two")
+                .expected("one"),
             );
             is_right = false;
         }
@@ -413,12 +441,19 @@ fn read_zone<'a>(checker: &mut Checker<'a>, zone: &'a tree::Zone) -> Option<Zone
         checker.require(is_fine, "a fraction", share.value.to_string(), "from 0 to 1", share.span)?;
         Some(share.value)
     });
-    let is_instant = matches!(&rate.value.kind, ExprKind::Path(path) if path.len() == 1 && path[0].value == "instant");
+    let is_instant =
+        matches!(&rate.value.kind, ExprKind::Path(path) if path.len() == 1 && path[0].value == "instant");
     let speed = if is_instant {
         Some(None)
     } else {
         checker.slot(&rate.value, "an exchange rate", Dimension::RATE).and_then(|speed| {
-            checker.require(speed.value >= 0.0, "an exchange rate", speed.value.to_string(), "zero or more", speed.span)?;
+            checker.require(
+                speed.value >= 0.0,
+                "an exchange rate",
+                speed.value.to_string(),
+                "zero or more",
+                speed.span,
+            )?;
             Some(Some(speed.value))
         })
     };
@@ -435,8 +470,11 @@ fn read_zone<'a>(checker: &mut Checker<'a>, zone: &'a tree::Zone) -> Option<Zone
 pub(super) fn particles<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> Option<Particles> {
     let (span, written) = statements.particles?;
     let kind = checker.word(&written.kind, "a kind of particle", &[("fluid", ())]);
-    let placements =
-        [("stratified", Placement::Stratified), ("random", Placement::Random), ("ordered", Placement::Ordered)];
+    let placements = [
+        ("stratified", Placement::Stratified),
+        ("random", Placement::Random),
+        ("ordered", Placement::Ordered),
+    ];
     let placement = match &written.placement {
         Some(name) => checker.word(name, "a placement", &placements),
         None => Some(Placement::Random),

@@ -173,7 +173,13 @@ fn every<'a>(checker: &mut Checker<'a>, interval: &'a tree::Expr, duration: Opti
     // A run that is a whole number of intervals long ends with an output, whatever the rounding.
     let n_intervals = (duration / interval.value * (1.0 + 1e-12)).floor();
     let found = format!("{n_intervals} times");
-    checker.require(n_intervals < MAX_TIMES, "the number of output times", found, "below 1e6", interval.span)?;
+    checker.require(
+        n_intervals < MAX_TIMES,
+        "the number of output times",
+        found,
+        "below 1e6",
+        interval.span,
+    )?;
     Some((0..=n_intervals as u64).map(|idx| (idx as f64 * interval.value).min(duration)).collect())
 }
 
@@ -278,6 +284,12 @@ fn output_unit(
         }
     }
     let factor = unit.factor();
-    checker.require(factor.is_finite() && factor > 0.0, "this unit", "a factor of zero", "a finite unit", written.span)?;
+    checker.require(
+        factor.is_finite() && factor > 0.0,
+        "this unit",
+        "a factor of zero",
+        "a finite unit",
+        written.span,
+    )?;
     Some((written.value.clone(), factor))
 }

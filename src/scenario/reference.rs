@@ -44,7 +44,9 @@ impl Target {
 
     fn species(self) -> usize {
         match self {
-            Target::Concentration(a) | Target::Total(a) | Target::Covariance(a, _) | Target::Mixing(a, _) => a,
+            Target::Concentration(a) | Target::Total(a) | Target::Covariance(a, _) | Target::Mixing(a, _) => {
+                a
+            }
         }
     }
 }
@@ -76,15 +78,21 @@ fn reference<'a>(
     let name = reference_name(written)?;
     let order_in_output = |target: Target| match target {
         Target::Covariance(a, b) | Target::Mixing(a, b)
-            if outputs.iter().any(|output| target.is_in(output) && output.pairs.contains(&(b, a))) && a != b =>
+            if outputs.iter().any(|output| target.is_in(output) && output.pairs.contains(&(b, a)))
+                && a != b =>
         {
-            if matches!(target, Target::Covariance(..)) { Target::Covariance(b, a) } else { Target::Mixing(b, a) }
+            if matches!(target, Target::Covariance(..)) {
+                Target::Covariance(b, a)
+            } else {
+                Target::Mixing(b, a)
+            }
         }
         other => other,
     };
     let target = order_in_output(target);
     if are_outputs_right && !outputs.iter().any(|output| target.is_in(output)) {
-        let kinds: Vec<String> = target.outputs().iter().map(|kind| format!("`output {}`", kind.word())).collect();
+        let kinds: Vec<String> =
+            target.outputs().iter().map(|kind| format!("`output {}`", kind.word())).collect();
         checker.report(
             Diagnostic::warning(M014, format!("reference `{}` is compared with nothing", name.value))
                 .at(name.span, "no output gives what it predicts")
@@ -104,7 +112,8 @@ fn target(checker: &mut Checker<'_>, written: &tree::Target, span: Span) -> Opti
             Some(checker.word(name, "an output that a reference can predict", &words)?)
         }
     };
-    let species: Vec<Option<usize>> = written.species.iter().map(|name| species_index(checker, name)).collect();
+    let species: Vec<Option<usize>> =
+        written.species.iter().map(|name| species_index(checker, name)).collect();
     let species: Vec<usize> = species.into_iter().collect::<Option<_>>()?;
     let target = match (kind, species.as_slice()) {
         (None | Some(OutputKind::Profile | OutputKind::Map), [a]) => Some(Target::Concentration(*a)),
@@ -139,9 +148,10 @@ fn solution<'a>(
         if let Some(item) = catalogue::find(&function.value) {
             return item_solution(checker, item, function, arguments, target);
         }
-        let is_of_scene = checker.scope.get(&function.value).is_some_and(|entry| {
-            matches!(entry.origin, super::scope::Origin::Function(_))
-        });
+        let is_of_scene = checker
+            .scope
+            .get(&function.value)
+            .is_some_and(|entry| matches!(entry.origin, super::scope::Origin::Function(_)));
         let is_built_in = super::scope::BUILT_IN_FUNCTIONS.contains(&function.value.as_str());
         if !is_of_scene && !is_built_in {
             report_unknown_item(checker, function);
@@ -162,10 +172,11 @@ fn solution<'a>(
 
 fn report_unknown_item(checker: &mut Checker<'_>, function: &tree::Name) {
     let names: Vec<&str> = catalogue::ALL.iter().map(|item| item.name).collect();
-    let mut message = Diagnostic::error(M004, format!("`{}` is neither a function nor a reference", function.value))
-        .at(function.span, "not known here")
-        .found(format!("`{}`", function.value))
-        .expected(names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", "));
+    let mut message =
+        Diagnostic::error(M004, format!("`{}` is neither a function nor a reference", function.value))
+            .at(function.span, "not known here")
+            .found(format!("`{}`", function.value))
+            .expected(names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", "));
     if let Some(candidate) = did_you_mean(&function.value, names.iter().copied()) {
         message = message.help(format!("did you mean `{candidate}`?"));
     }
@@ -262,10 +273,16 @@ fn assign<'a>(
         let Some(slot) = slot else {
             let mut message = Diagnostic::error(D007, format!("`{}` has no such argument", item.name))
                 .at(place, "not an argument")
-                .found(argument.name.as_ref().map_or("one argument too many".into(), |name| format!("`{}`", name.value)))
+                .found(
+                    argument
+                        .name
+                        .as_ref()
+                        .map_or("one argument too many".into(), |name| format!("`{}`", name.value)),
+                )
                 .expected(signature(item));
             let names = item.arguments.iter().map(|known| known.name);
-            if let Some(candidate) = argument.name.as_ref().and_then(|name| did_you_mean(&name.value, names)) {
+            if let Some(candidate) = argument.name.as_ref().and_then(|name| did_you_mean(&name.value, names))
+            {
                 message = message.help(format!("did you mean `{candidate}`?"));
             }
             checker.report(message);
@@ -286,7 +303,12 @@ fn assign<'a>(
     is_right.then_some(slots)
 }
 
-fn check_prediction(checker: &mut Checker<'_>, item: &Item, function: &tree::Name, target: Target) -> Option<()> {
+fn check_prediction(
+    checker: &mut Checker<'_>,
+    item: &Item,
+    function: &tree::Name,
+    target: Target,
+) -> Option<()> {
     let (fits, predicts) = match item.predicts {
         Predicts::Concentration => (matches!(target, Target::Concentration(_)), "a concentration"),
         Predicts::Covariance => (matches!(target, Target::Covariance(..)), "a covariance"),

@@ -128,7 +128,8 @@ impl<'a> Scope<'a> {
                 message = message.note(format!("it is used in {} more places", n_uses - 1));
             }
             let names = self.entries.keys().map(String::as_str);
-            let candidates = names.chain(BUILT_IN_FUNCTIONS.iter().copied()).chain(axes.iter().map(String::as_str));
+            let candidates =
+                names.chain(BUILT_IN_FUNCTIONS.iter().copied()).chain(axes.iter().map(String::as_str));
             if let Some(candidate) = did_you_mean(name, candidates) {
                 message = message.help(format!("did you mean `{candidate}`?"));
                 if let Some(entry) = self.entries.get(candidate) {

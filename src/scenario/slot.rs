@@ -107,7 +107,13 @@ impl<'a> Checker<'a> {
     /// A whole number of at least one, written or from a parameter.
     pub(super) fn count(&mut self, value: f64, what: &str, most: f64, span: Span) -> Option<u64> {
         let rule = format!("a whole number from 1 to {most}");
-        self.require(value.fract() == 0.0 && (1.0..=most).contains(&value), what, value.to_string(), &rule, span)?;
+        self.require(
+            value.fract() == 0.0 && (1.0..=most).contains(&value),
+            what,
+            value.to_string(),
+            &rule,
+            span,
+        )?;
         Some(value as u64)
     }
 
@@ -144,7 +150,9 @@ impl<'a> Checker<'a> {
     }
 
     fn bound(&mut self, bound: &'a tree::Expr, other: &'a tree::Expr) -> Option<Expr> {
-        let Some((digits, is_negative)) = bare_number(bound) else { return self.check(bound, Allow::CONSTANT) };
+        let Some((digits, is_negative)) = bare_number(bound) else {
+            return self.check(bound, Allow::CONSTANT);
+        };
         let Some(unit) = unit_of(other) else { return self.check(bound, Allow::CONSTANT) };
         let number = tree::Number { digits: digits.to_owned(), unit: Some(unit.clone()) };
         let value = self.number(&number, bound.span)?;
@@ -170,7 +178,12 @@ impl<'a> Checker<'a> {
     }
 
     /// A vector over the axes of the domain: a single value for one axis, a list for more.
-    pub(super) fn vector(&mut self, expr: &'a tree::Expr, what: &str, dimension: Dimension) -> Option<[f64; 3]> {
+    pub(super) fn vector(
+        &mut self,
+        expr: &'a tree::Expr,
+        what: &str,
+        dimension: Dimension,
+    ) -> Option<[f64; 3]> {
         let parts = tuple_parts(expr);
         let indices: Vec<usize> = self.axes.iter().map(|(_, index)| *index).collect();
         if parts.len() != indices.len() {
@@ -187,7 +200,8 @@ impl<'a> Checker<'a> {
             );
             return None;
         }
-        let values: Vec<Option<Value>> = parts.into_iter().map(|part| self.slot(part, what, dimension)).collect();
+        let values: Vec<Option<Value>> =
+            parts.into_iter().map(|part| self.slot(part, what, dimension)).collect();
         let mut vector = [0.0; 3];
         for (index, value) in indices.into_iter().zip(values) {
             vector[index] = value?.value;
