@@ -5,8 +5,8 @@
 
 mod completions;
 mod explain;
-#[allow(dead_code)]
 mod files;
+mod fmt;
 #[allow(dead_code)]
 mod interrupt;
 mod new;
@@ -68,6 +68,7 @@ pub(crate) enum ColorChoice {
 #[derive(Subcommand)]
 enum Command {
     New(new::Arguments),
+    Fmt(fmt::Arguments),
     Explain(explain::Arguments),
     Completions(completions::Arguments),
 }
@@ -102,6 +103,7 @@ pub(crate) fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let terminal = Terminal::new(&arguments.global);
     let result = match &arguments.command {
+        Command::Fmt(fmt) => fmt::run(fmt, &terminal),
         Command::New(new) => new::run(new, &terminal),
         Command::Explain(explain) => explain::run(explain, &terminal),
         Command::Completions(completions) => completions::run(completions, &terminal),
