@@ -13,3 +13,28 @@ pub mod source;
 pub mod syntax;
 pub mod table;
 pub mod units;
+
+use diagnostic::{Diagnostic, any_fatal};
+use scenario::{Scenario, Settings};
+use source::{FileId, Sources};
+use syntax::tree;
+
+/// How far a scene came on its way from text to plan, and everything that is to be said about it.
+#[derive(Debug, Clone)]
+pub struct Checked {
+    /// The scene's files; settings of the command line are appended, so that messages can show them.
+    pub sources: Sources,
+    pub file: tree::File,
+    /// Absent if the scene is wrong.
+    pub scenario: Option<Scenario>,
+    pub diagnostics: Vec<Diagnostic>,
+}
+
+/// Takes the first file of `sources` as far as it goes. Ends for every text, and never panics.
+pub fn check(mut sources: Sources, settings: &Settings) -> Checked {
+    let (file, mut diagnostics) = syntax::parse(FileId(0), &sources.file(FileId(0)).text);
+    let has_syntax_errors = any_fatal(&diagnostics);
+    let (scenario, more) = scenario::resolve(&file, &mut sources, settings, has_syntax_errors);
+    diagnostics.extend(more);
+    Checked { sources, file, scenario, diagnostics }
+}

@@ -3,12 +3,14 @@
 //! Owns everything a user of the program sees and is the only place that prints. May use the whole
 //! library. It deliberately computes nothing: each command calls the library and shows what it says.
 
+mod check;
 mod completions;
 mod explain;
 mod files;
 mod fmt;
 #[allow(dead_code)]
 mod interrupt;
+mod load;
 mod new;
 #[allow(dead_code)]
 mod progress;
@@ -68,6 +70,7 @@ pub(crate) enum ColorChoice {
 #[derive(Subcommand)]
 enum Command {
     New(new::Arguments),
+    Check(check::Arguments),
     Fmt(fmt::Arguments),
     Explain(explain::Arguments),
     Completions(completions::Arguments),
@@ -103,6 +106,7 @@ pub(crate) fn main() -> ExitCode {
     let arguments = Arguments::parse();
     let terminal = Terminal::new(&arguments.global);
     let result = match &arguments.command {
+        Command::Check(check) => check::run(check, &terminal),
         Command::Fmt(fmt) => fmt::run(fmt, &terminal),
         Command::New(new) => new::run(new, &terminal),
         Command::Explain(explain) => explain::run(explain, &terminal),

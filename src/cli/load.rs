@@ -1,0 +1,24 @@
+//! From a path to a checked scene; what `check`, `plan` and `run` have in common.
+
+use super::Stopped;
+use super::files::{display_name, read_scene};
+use lamella::Checked;
+use lamella::scenario::Settings;
+use lamella::source::Sources;
+use std::path::Path;
+
+/// Reads a scene and takes it as far as it goes.
+pub(crate) fn check(path: &Path, settings: &Settings) -> Result<Checked, Stopped> {
+    let text = read_scene(path)?;
+    Ok(lamella::check(Sources::single(display_name(path), text), settings))
+}
+
+/// `name=value` of `--set`; the value is an expression of the language.
+pub(crate) fn parse_setting(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((name, value)) if !name.trim().is_empty() && !value.trim().is_empty() => {
+            Ok((name.trim().to_owned(), value.trim().to_owned()))
+        }
+        _ => Err("expected name=value, such as v=2cm/s".to_owned()),
+    }
+}
