@@ -96,6 +96,15 @@ codes! {
     M014 "a reference is compared with nothing",
     M015 "a measure asks for a result that no output gives",
     M016 "a reference does not fit",
+    N101 "means over few particles are mostly noise",
+    N102 "the step is coarse for a mixing zone",
+    N103 "the bins add dispersion",
+    N104 "a step carries particles across the whole domain",
+    N201 "bins without particles",
+    N202 "a step cannot resolve a mixing zone",
+    N203 "the bins disperse more than the scene",
+    N301 "the run does not fit into memory",
+    L010 "what a scene does not need is left out",
 }
 
 /// The entry of a code as a user types it (`u104` and `U104` are the same).

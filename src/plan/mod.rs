@@ -3,8 +3,19 @@
 //! Owns the plan's types, its lowering from a scenario, the passes, the limits and the hash. May
 //! use the words, the catalogue and `scenario`. It deliberately runs nothing.
 
+pub mod build_tape;
+mod check;
+pub mod compile;
+pub mod cost;
+pub mod document;
 pub mod evaluation;
+pub mod explain;
+pub mod limits;
+mod lower;
+pub mod passes;
 pub mod tape;
+
+pub use compile::{Compiled, Options, compile, hash};
 
 use serde::{Deserialize, Serialize};
 use tape::Tape;

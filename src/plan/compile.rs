@@ -1,0 +1,67 @@
+//! Scenario to frozen plan: lowering, passes, limits, hash.
+
+use super::cost::{self, Cost};
+use super::evaluation::Evaluation;
+use super::limits::{self, Limit};
+use super::passes::{self, Draft, LeftOut};
+use super::{Plan, lower};
+use crate::diagnostic::Diagnostic;
+use crate::diagnostic::codes::L010;
+use crate::scenario::Scenario;
+
+/// How to compile.
+#[derive(Debug, Clone, Default)]
+pub struct Options {
+    /// Leave nothing out; the tables must not change where the passes only drop or fuse.
+    pub without_passes: bool,
+    /// Bytes that a run may use; `None` leaves memory unchecked.
+    pub memory: Option<u64>,
+}
+
+/// A frozen plan and what can be told about it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Compiled {
+    pub plan: Plan,
+    pub evaluation: Evaluation,
+    /// BLAKE3 of the canonical plan, 64 hexadecimal digits.
+    pub hash: String,
+    pub left_out: Vec<LeftOut>,
+    pub limits: Vec<Limit>,
+    pub cost: Cost,
+}
+
+/// Compiles a scenario. The plan is absent if a limit refuses it.
+pub fn compile(scenario: &Scenario, options: &Options) -> (Option<Compiled>, Vec<Diagnostic>) {
+    let (plan, evaluation) = match lower::lower(scenario) {
+        Ok(lowered) => lowered,
+        Err(problems) => return (None, problems),
+    };
+    let mut draft = Draft { plan, evaluation, left_out: Vec::new() };
+    if let Err(reason) = draft.plan.check() {
+        panic!("lowering made a plan that is not well-formed: {reason}");
+    }
+    passes::run(&mut draft, |_| !options.without_passes);
+    let cost = cost::estimate(&draft.plan);
+    let (limits, diagnostics) = limits::check(scenario, &draft, &cost, options.memory);
+    if crate::diagnostic::any_fatal(&diagnostics) {
+        return (None, diagnostics);
+    }
+    let hash = hash(&draft.plan);
+    let Draft { plan, evaluation, left_out } = draft;
+    (Some(Compiled { plan, evaluation, hash, left_out, limits, cost }), diagnostics)
+}
+
+/// BLAKE3 over the canonical text of a plan: JSON with fields in the order of their definition and
+/// numbers in their shortest form that reads back to the same bits.
+pub fn hash(plan: &Plan) -> String {
+    let text = serde_json::to_string(plan).expect("plans hold finite numbers, lists and names only");
+    blake3::hash(text.as_bytes()).to_hex().to_string()
+}
+
+impl Compiled {
+    /// What was left out, as one message.
+    pub fn left_out_note(&self) -> Diagnostic {
+        let list: Vec<String> = self.left_out.iter().map(|item| format!("{} ({})", item.what, item.why)).collect();
+        Diagnostic::remark(L010, format!("left out of this run: {}", list.join(", ")))
+    }
+}

@@ -1,0 +1,90 @@
+//! What a run will cost: time from a table of measured stage costs, memory from the state.
+
+use super::{Normals, OutputKind, Plan, Stage, ZoneRate};
+use serde::Serialize;
+
+/// Measured on one core of a shared x86-64 server (Zen 3, AVX2) by `make bench`; nanoseconds.
+/// They serve estimates only: no decision that changes bytes hangs on them.
+mod table {
+    /// One normal number and its displacement.
+    pub(super) const MOVE_SINGLE: f64 = 3.2;
+    pub(super) const MOVE_DOUBLE: f64 = 12.0;
+    /// One side pair applied and one bin index worked out, per axis.
+    pub(super) const BOUND: f64 = 0.5;
+    /// Sum of one value and count of one particle.
+    pub(super) const AVERAGE: f64 = 0.9;
+    /// Relaxation of one stored value.
+    pub(super) const MIX: f64 = 0.7;
+    /// One particle observed once: positions worked out again, species restored, sums.
+    pub(super) const OBSERVE: f64 = 25.0;
+}
+
+/// The estimate for a whole run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Cost {
+    /// Bytes of particle state.
+    pub state_bytes: u64,
+    /// Bytes of sums over bins, for all groups of blocks together.
+    pub bin_bytes: u64,
+    pub particle_steps: f64,
+    /// Nanoseconds per particle and step, one entry per stage.
+    pub stages: Vec<(Stage, f64)>,
+    /// Seconds of one core, observations included.
+    pub cpu_seconds: f64,
+}
+
+/// Values that every particle stores for each component.
+pub fn n_stored_values(plan: &Plan) -> usize {
+    match &plan.mixing {
+        None => 1,
+        Some(mixing) => {
+            let n_zones = mixing.zones.iter().filter(|zone| zone.is_stored).count();
+            n_zones + usize::from(mixing.is_well_mixed)
+        }
+    }
+}
+
+/// Works the estimate out.
+pub fn estimate(plan: &Plan) -> Cost {
+    let n_axes = plan.axes.len() as f64;
+    let n_particles = plan.particles.count as f64;
+    let n_values = (plan.components.len() * n_stored_values(plan)) as f64;
+    let n_exchanging = plan.mixing.as_ref().map_or(0, |mixing| {
+        mixing.zones.iter().filter(|zone| matches!(zone.rate, ZoneRate::Finite(rate) if rate > 0.0)).count()
+    });
+    let n_relaxed = (plan.components.len() * n_exchanging) as f64;
+    let move_cost = match plan.walk.normals {
+        Normals::Single => table::MOVE_SINGLE,
+        Normals::Double => table::MOVE_DOUBLE,
+    };
+    let cost_of = |stage: Stage| match stage {
+        Stage::Mix => table::MIX * n_relaxed,
+        Stage::Move => move_cost * n_axes,
+        Stage::Bound => table::BOUND * n_axes,
+        Stage::Average => table::AVERAGE * n_values,
+        Stage::FusedStep => {
+            move_cost * n_axes + table::BOUND * n_axes + table::AVERAGE * n_values + table::MIX * n_relaxed
+        }
+        Stage::Observe => 0.0,
+    };
+    let stages: Vec<(Stage, f64)> = plan.stages.iter().map(|&stage| (stage, cost_of(stage))).collect();
+    let per_step: f64 = stages.iter().map(|(_, cost)| cost).sum();
+    let particle_steps = n_particles * plan.time.n_steps as f64;
+    let n_observations: usize = plan.outputs.iter().map(|output| output.times.len()).sum();
+    let nanoseconds = per_step * particle_steps + table::OBSERVE * n_observations as f64 * n_particles;
+    let n_bins: f64 = plan.axes.iter().map(|axis| axis.bins as f64).product();
+    Cost {
+        state_bytes: (8.0 * n_particles * (n_axes + n_values)) as u64,
+        bin_bytes: (8.0 * n_bins * (1.0 + n_values) * 2.0) as u64,
+        particle_steps,
+        stages,
+        cpu_seconds: nanoseconds * 1e-9,
+    }
+}
+
+/// Bytes that one whole observation of every particle takes while it is written.
+pub fn particle_output_bytes(plan: &Plan) -> u64 {
+    let columns = |output: &super::Output| (plan.axes.len() + output.quantities.len()) as u64;
+    let of_particles = plan.outputs.iter().filter(|output| output.kind == OutputKind::Particles);
+    of_particles.map(columns).max().unwrap_or(0) * 8 * plan.particles.count
+}

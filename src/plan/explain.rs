@@ -1,0 +1,228 @@
+//! The plan in words: what runs, in which order, what it costs, what was left out and why.
+
+use super::compile::Compiled;
+use super::cost::n_stored_values;
+use super::{Normals, Plan, Quantity, Side, Stage, ZoneRate};
+use std::fmt::Write as _;
+
+/// The text of `lamella plan`.
+pub fn explain(compiled: &Compiled, name: &str, title: Option<&str>) -> String {
+    let mut text = String::new();
+    let _ = writeln!(text, "plan of {name}");
+    if let Some(title) = title {
+        let _ = writeln!(text, "  {title}");
+    }
+    let _ = writeln!(text, "  hash {}", compiled.hash);
+    section(&mut text, "what runs", &scene_lines(&compiled.plan));
+    section(&mut text, "each step, in this order", &step_lines(compiled));
+    section(&mut text, "what particles carry", &field_lines(&compiled.plan));
+    section(&mut text, "outputs", &output_lines(&compiled.plan));
+    section(&mut text, "what it costs", &cost_lines(compiled));
+    section(&mut text, "limits", &limit_lines(compiled));
+    section(&mut text, "left out", &left_out_lines(compiled));
+    text
+}
+
+fn section(text: &mut String, heading: &str, lines: &[String]) {
+    if lines.is_empty() {
+        return;
+    }
+    let _ = writeln!(text, "\n{heading}");
+    for line in lines {
+        let _ = writeln!(text, "  {line}");
+    }
+}
+
+fn axis_name(index: usize) -> &'static str {
+    ["x", "y", "z"][index]
+}
+
+/// A number as people read it: few digits, no exponent where it is short without.
+pub fn number(value: f64) -> String {
+    let magnitude = value.abs();
+    if value == 0.0 || (1e-3..1e6).contains(&magnitude) {
+        let text = format!("{value:.6}");
+        let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+        text.to_owned()
+    } else {
+        format!("{value:.4e}")
+    }
+}
+
+/// A whole number with blanks between thousands.
+pub fn grouped(value: u64) -> String {
+    let digits = value.to_string();
+    let mut text = String::new();
+    for (idx, digit) in digits.chars().enumerate() {
+        if idx > 0 && (digits.len() - idx) % 3 == 0 {
+            text.push(' ');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+fn side(side: Side) -> &'static str {
+    match side {
+        Side::Reflect => "reflect",
+        Side::Periodic => "periodic",
+        Side::Open => "open",
+    }
+}
+
+fn scene_lines(plan: &Plan) -> Vec<String> {
+    let mut lines = vec![format!(
+        "{} fluid particles, {:?} placement, seed {}",
+        grouped(plan.particles.count),
+        plan.particles.placement,
+        plan.seed
+    )
+    .to_lowercase()];
+    for (idx, axis) in plan.axes.iter().enumerate() {
+        let b = &plan.walk.spread[idx * (idx + 1) / 2..][..=idx];
+        let dispersion = 0.5 * b.iter().map(|b| b * b).sum::<f64>();
+        lines.push(format!(
+            "axis {}: {} .. {} m ({} / {}), {} bins, drift {} m/s, dispersion {} m^2/s",
+            axis_name(axis.index),
+            number(axis.low),
+            number(axis.high),
+            side(axis.low_side),
+            side(axis.high_side),
+            axis.bins,
+            number(plan.walk.drift[idx]),
+            number(dispersion),
+        ));
+    }
+    let time = &plan.time;
+    lines.push(format!(
+        "{} steps of {} s to {} s",
+        grouped(time.n_steps),
+        number(time.step),
+        number(time.duration)
+    ));
+    let normals = match plan.walk.normals {
+        Normals::Single => "normal numbers in 32-bit lanes (largest about 6.6 standard deviations)",
+        Normals::Double => "normal numbers in 64 bits",
+    };
+    lines.push(normals.to_owned());
+    lines
+}
+
+fn stage_words(stage: Stage) -> &'static str {
+    match stage {
+        Stage::Mix => "mix: relax towards the means of the bins",
+        Stage::Move => "move: drift and dispersion",
+        Stage::Bound => "bound: apply the sides of the domain",
+        Stage::Average => "average: sums and means per bin",
+        Stage::FusedStep => "mix, move, bound and average in one pass over memory",
+        Stage::Observe => "observe: outputs that are due",
+    }
+}
+
+fn step_lines(compiled: &Compiled) -> Vec<String> {
+    let line = |(stage, cost): &(Stage, f64)| match stage {
+        Stage::Observe => stage_words(*stage).to_owned(),
+        _ => format!("{}   (about {cost:.1} ns per particle)", stage_words(*stage)),
+    };
+    compiled.cost.stages.iter().map(line).collect()
+}
+
+fn field_lines(plan: &Plan) -> Vec<String> {
+    let mut lines = Vec::new();
+    let n_values = n_stored_values(plan);
+    let names: Vec<&str> = plan.components.iter().map(|component| component.name.as_str()).collect();
+    if names.is_empty() {
+        lines.push("positions only".to_owned());
+    } else {
+        let plural = if n_values == 1 { "one value" } else { "values" };
+        lines.push(format!("{}: {n_values} {plural} each, beside the position", names.join(", ")));
+    }
+    if let Some(mixing) = &plan.mixing {
+        for zone in &mixing.zones {
+            let rate = match zone.rate {
+                ZoneRate::Instant => "instant".to_owned(),
+                ZoneRate::Finite(rate) => format!("rate {} /s", number(rate)),
+            };
+            let stored = if zone.is_stored { "stored" } else { "not stored" };
+            lines.push(format!("zone {}: fraction {}, {rate}, {stored}", zone.name, number(zone.fraction)));
+        }
+        if mixing.is_well_mixed {
+            lines.push("every zone is instant: particles carry an unmixed value, means are taken at outputs".into());
+        }
+    }
+    for species in &plan.species {
+        let is_itself = matches!(species.terms.as_slice(), [(component, factor)]
+            if *factor == 1.0 && plan.components[*component].name == species.name && species.constant == 0.0);
+        if is_itself {
+            continue;
+        }
+        let terms: Vec<String> = species
+            .terms
+            .iter()
+            .map(|(component, factor)| format!(" + {} {}", number(*factor), plan.components[*component].name))
+            .collect();
+        lines.push(format!("{} before reaction = {}{}", species.name, number(species.constant), terms.concat()));
+    }
+    for reaction in &plan.reactions {
+        let side = |list: &[(usize, f64)]| {
+            let term = |(species, nu): &(usize, f64)| match *nu {
+                1.0 => plan.species[*species].name.clone(),
+                nu => format!("{} {}", number(nu), plan.species[*species].name),
+            };
+            list.iter().map(term).collect::<Vec<_>>().join(" + ")
+        };
+        lines.push(format!(
+            "reaction {}: {} -> {}, complete, worked out at outputs",
+            reaction.name,
+            side(&reaction.reactants),
+            side(&reaction.products)
+        ));
+    }
+    lines
+}
+
+fn output_lines(plan: &Plan) -> Vec<String> {
+    let name = |idx: usize| plan.species[idx].name.as_str();
+    let line = |output: &super::Output| {
+        let quantities: Vec<String> = output
+            .quantities
+            .iter()
+            .map(|quantity| match *quantity {
+                Quantity::Species(a) => name(a).to_owned(),
+                Quantity::Pair(a, b) => format!("({}, {})", name(a), name(b)),
+            })
+            .collect();
+        let bins: Vec<String> = output.bins.iter().map(ToString::to_string).collect();
+        let on = if bins.is_empty() { String::new() } else { format!(" on {} bins", bins.join(" x ")) };
+        let times = match output.times.as_slice() {
+            [] => "never".to_owned(),
+            [only] => format!("at {} s", number(*only)),
+            [first, .., last] => {
+                format!("at {} times from {} to {} s", output.times.len(), number(*first), number(*last))
+            }
+        };
+        format!("{} of {}{on}, {times}", output.kind.word(), quantities.join(", "))
+    };
+    plan.outputs.iter().map(line).collect()
+}
+
+fn cost_lines(compiled: &Compiled) -> Vec<String> {
+    let cost = &compiled.cost;
+    let mib = |bytes: u64| number((bytes as f64 / f64::from(1u32 << 20) * 10.0).round() / 10.0);
+    vec![
+        format!("{} particle-steps", number(cost.particle_steps)),
+        format!("about {} s on one core", number((cost.cpu_seconds * 100.0).round() / 100.0)),
+        format!("{} MiB of particle state, {} MiB of sums over bins", mib(cost.state_bytes), mib(cost.bin_bytes)),
+    ]
+}
+
+fn limit_lines(compiled: &Compiled) -> Vec<String> {
+    let line = |limit: &super::limits::Limit| {
+        format!("{} = {}   ({}; {})", limit.name, number(limit.value), limit.formula, limit.advice)
+    };
+    compiled.limits.iter().map(line).collect()
+}
+
+fn left_out_lines(compiled: &Compiled) -> Vec<String> {
+    compiled.left_out.iter().map(|item| format!("{}: {}", item.what, item.why)).collect()
+}

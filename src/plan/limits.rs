@@ -1,0 +1,280 @@
+//! Limits of stability and accuracy, computed from the scene before anything runs.
+//!
+//! Owns the numbers and the verdicts; a step, a number of bins or of particles that cannot work is
+//! refused at its line, with the one that would. May use `scenario` for the places.
+
+use super::cost::{self, Cost};
+use super::passes::Draft;
+use super::{Plan, ZoneRate};
+use crate::diagnostic::Diagnostic;
+use crate::diagnostic::codes::{N101, N102, N103, N104, N201, N202, N203, N301};
+use crate::scenario::Scenario;
+use crate::source::Span;
+use serde::Serialize;
+
+/// A dimensionless number of the run and what it means.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Limit {
+    pub name: String,
+    pub formula: &'static str,
+    pub value: f64,
+    pub advice: &'static str,
+}
+
+/// Particles per bin below which means are mostly noise, and below which they mean nothing.
+const FEW_PER_BIN: f64 = 50.0;
+const TOO_FEW_PER_BIN: f64 = 2.0;
+/// χΔt above which splitting shows, and above which the covariance of a zone is lost in one step.
+const LARGE_EXCHANGE: f64 = 0.2;
+const TOO_LARGE_EXCHANGE: f64 = 2.0;
+/// Numerical dispersion of the bins against the physical one.
+const VISIBLE_DISPERSION: f64 = 0.02;
+
+/// Works all limits out; diagnostics tell of those that are passed.
+pub fn check(
+    scenario: &Scenario,
+    draft: &Draft,
+    cost: &Cost,
+    memory: Option<u64>,
+) -> (Vec<Limit>, Vec<Diagnostic>) {
+    let plan = &draft.plan;
+    let mut limits = Vec::new();
+    let mut diagnostics = Vec::new();
+    travel(scenario, plan, &mut limits, &mut diagnostics);
+    if plan.mixing.is_some() {
+        particles_per_bin(scenario, plan, &mut limits, &mut diagnostics);
+        exchange(scenario, plan, &mut limits, &mut diagnostics);
+        numerical_dispersion(scenario, plan, &mut limits, &mut diagnostics);
+    }
+    check_memory(scenario, plan, cost, memory, &mut diagnostics);
+    (limits, diagnostics)
+}
+
+fn axis_name(index: usize) -> &'static str {
+    ["x", "y", "z"][index]
+}
+
+/// Standard deviation of one step along an axis, m.
+fn spread_length(plan: &Plan, axis_idx: usize, step: f64) -> f64 {
+    let row = &plan.walk.spread[axis_idx * (axis_idx + 1) / 2..][..=axis_idx];
+    (row.iter().map(|b| b * b).sum::<f64>() * step).sqrt()
+}
+
+/// Dispersion coefficient along an axis, m²/s.
+fn dispersion(plan: &Plan, axis_idx: usize) -> f64 {
+    0.5 * spread_length(plan, axis_idx, 1.0).powi(2)
+}
+
+fn travel(scenario: &Scenario, plan: &Plan, limits: &mut Vec<Limit>, diagnostics: &mut Vec<Diagnostic>) {
+    let step = plan.time.step.min(plan.time.duration);
+    for (idx, axis) in plan.axes.iter().enumerate() {
+        let extent = axis.high - axis.low;
+        let width = extent / axis.bins as f64;
+        let advective = plan.walk.drift[idx].abs() * step;
+        let dispersive = spread_length(plan, idx, step);
+        if axis.bins > 1 {
+            limits.push(Limit {
+                name: format!("Courant number along {}", axis_name(axis.index)),
+                formula: "|v - v_frame| dt / bin width",
+                value: advective / width,
+                advice: "any value is exact for constant coefficients",
+            });
+            limits.push(Limit {
+                name: format!("dispersion length per bin along {}", axis_name(axis.index)),
+                formula: "sqrt(2 D dt) / bin width",
+                value: dispersive / width,
+                advice: "bins re-mix when particles change bins; below 0.1 exchange saturates within bins",
+            });
+        }
+        if advective + 3.0 * dispersive > extent {
+            diagnostics.push(
+                Diagnostic::warning(N104, format!("a step carries particles across the whole domain along {}", axis_name(axis.index)))
+                    .at(scenario.run.step_span, format!("{step} s"))
+                    .found(format!("{:.3e} m in a step", advective + 3.0 * dispersive))
+                    .expected(format!("less than the extent, {extent:.3e} m"))
+                    .note("positions stay right in law; what happens between two outputs is not resolved"),
+            );
+        }
+    }
+}
+
+fn n_bins(plan: &Plan) -> f64 {
+    plan.axes.iter().map(|axis| axis.bins as f64).product()
+}
+
+fn bins_span(scenario: &Scenario) -> Span {
+    scenario.bins.as_ref().map_or(scenario.particles.count_span, |bins| bins.span)
+}
+
+fn particles_per_bin(
+    scenario: &Scenario,
+    plan: &Plan,
+    limits: &mut Vec<Limit>,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    let n_particles = plan.particles.count as f64;
+    let per_bin = n_particles / n_bins(plan);
+    limits.push(Limit {
+        name: "particles per bin".into(),
+        formula: "N / bins",
+        value: per_bin,
+        advice: "at least 50; above 1000 the bias of products is below 0.1 %",
+    });
+    let needed = (n_bins(plan) * FEW_PER_BIN).ceil();
+    let affordable = (n_particles / FEW_PER_BIN).floor().max(1.0);
+    let place = |message: Diagnostic| {
+        message
+            .at(bins_span(scenario), format!("{} bins", n_bins(plan)))
+            .also(scenario.particles.count_span, format!("{} particles", plan.particles.count))
+            .found(format!("{per_bin:.3} particles per bin"))
+            .expected(format!("at least {FEW_PER_BIN}"))
+            .help(format!("use at least {needed:e} particles, or at most {affordable} bins in all"))
+    };
+    if per_bin < TOO_FEW_PER_BIN {
+        diagnostics.push(place(Diagnostic::refused(N201, "bins without particles have no mean to exchange with")));
+    } else if per_bin < FEW_PER_BIN {
+        diagnostics.push(place(Diagnostic::warning(N101, "means over few particles are mostly noise")));
+    }
+}
+
+fn exchange(scenario: &Scenario, plan: &Plan, limits: &mut Vec<Limit>, diagnostics: &mut Vec<Diagnostic>) {
+    let Some(mixing) = &plan.mixing else { return };
+    for zone in &mixing.zones {
+        let ZoneRate::Finite(rate) = zone.rate else { continue };
+        let value = rate * plan.time.step;
+        limits.push(Limit {
+            name: format!("exchange per step of zone `{}`", zone.name),
+            formula: "chi dt",
+            value,
+            advice: "below 0.2; the relaxation itself is exact for any value",
+        });
+        if value <= LARGE_EXCHANGE {
+            continue;
+        }
+        let written = scenario.mixing.as_ref().and_then(|m| m.zones.iter().find(|z| z.name == zone.name));
+        let step = LARGE_EXCHANGE / rate;
+        let message = if value > TOO_LARGE_EXCHANGE {
+            let title = format!(
+                "step {} s cannot resolve zone `{}`: 1/chi = {:.4} s, allowed {step:.4} s",
+                plan.time.step,
+                zone.name,
+                1.0 / rate
+            );
+            Diagnostic::refused(N202, title)
+        } else {
+            Diagnostic::warning(N102, format!("the step is coarse for zone `{}`", zone.name))
+        };
+        let mut message = message
+            .at(scenario.run.step_span, format!("chi dt = {value:.3}"))
+            .found(format!("chi dt = {value:.3}"))
+            .expected(format!("chi dt <= {LARGE_EXCHANGE}"))
+            .help(format!("use `step {}` or less, or write `rate instant` if the limit is meant", round_down(step)));
+        if let Some(written) = written {
+            message = message.also(written.rate_span, "the rate is set here");
+        }
+        diagnostics.push(message);
+    }
+}
+
+/// A step of two figures, not above the given one, as text of the language.
+fn round_down(seconds: f64) -> String {
+    let scale = 10f64.powi(seconds.log10_floor() - 1);
+    let rounded = (seconds / scale * (1.0 + 1e-12)).floor() * scale;
+    format!("{rounded:.3e} s")
+}
+
+trait Log10Floor {
+    fn log10_floor(self) -> i32;
+}
+
+impl Log10Floor for f64 {
+    fn log10_floor(self) -> i32 {
+        crate::maths::scalar::log10(self).floor() as i32
+    }
+}
+
+/// D_num = Σ η_i min(χ_i Δ²/24, Δ²/(12 Δt)) / Σ η_i over the zones that set the mean.
+///
+/// - Symbols: η_i fraction, χ_i exchange rate, Δ bin width, Δt step; instant zones follow the mean.
+/// - Dimensions and range: m²/s; an upper estimate that holds while motion re-mixes the bins.
+/// - Source: Sole-Mari, Fernàndez-Garcia, Sanchez-Vila, Bolster 2020 (quadratic scaling in Δ);
+///   derivation in docs/methods.md.
+/// - Shape: one value per axis.
+fn bin_dispersion(plan: &Plan, axis_idx: usize) -> f64 {
+    let Some(mixing) = &plan.mixing else { return 0.0 };
+    let axis = &plan.axes[axis_idx];
+    let width = (axis.high - axis.low) / axis.bins as f64;
+    let saturated = width * width / (12.0 * plan.time.step);
+    let mut sum = 0.0;
+    let mut weight = 0.0;
+    for zone in &mixing.zones {
+        if let ZoneRate::Finite(rate) = zone.rate {
+            sum += zone.fraction * (rate * width * width / 24.0).min(saturated);
+            weight += zone.fraction;
+        }
+    }
+    if weight > 0.0 { sum / weight } else { 0.0 }
+}
+
+fn numerical_dispersion(
+    scenario: &Scenario,
+    plan: &Plan,
+    limits: &mut Vec<Limit>,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    for (idx, axis) in plan.axes.iter().enumerate() {
+        let physical = dispersion(plan, idx);
+        let numerical = bin_dispersion(plan, idx);
+        if axis.bins <= 1 || physical == 0.0 || numerical == 0.0 {
+            continue;
+        }
+        let ratio = numerical / physical;
+        limits.push(Limit {
+            name: format!("numerical dispersion along {}", axis_name(axis.index)),
+            formula: "chi width^2 / 24 / D",
+            value: ratio,
+            advice: "below 0.02; falls with the square of the bin width",
+        });
+        if ratio <= VISIBLE_DISPERSION {
+            continue;
+        }
+        let needed = (axis.bins as f64 * (ratio / VISIBLE_DISPERSION).sqrt()).ceil();
+        let name = axis_name(axis.index);
+        let message = if ratio > 1.0 {
+            Diagnostic::refused(N203, format!("the bins along {name} disperse more than the scene does"))
+        } else {
+            Diagnostic::warning(N103, format!("the bins along {name} add dispersion"))
+        };
+        diagnostics.push(
+            message
+                .at(bins_span(scenario), format!("{} bins along {name}", axis.bins))
+                .found(format!("{:.3} of the dispersion coefficient", ratio))
+                .expected(format!("at most {VISIBLE_DISPERSION}"))
+                .help(format!("use at least {needed} bins along {name}")),
+        );
+    }
+}
+
+fn check_memory(
+    scenario: &Scenario,
+    plan: &Plan,
+    cost: &Cost,
+    memory: Option<u64>,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    let Some(available) = memory else { return };
+    let needed = cost.state_bytes.saturating_add(cost.bin_bytes).saturating_add(cost::particle_output_bytes(plan));
+    if needed <= available {
+        return;
+    }
+    let gib = |bytes: u64| bytes as f64 / f64::from(1u32 << 30);
+    let per_particle = needed as f64 / plan.particles.count as f64;
+    let fitting = (available as f64 / per_particle).floor();
+    diagnostics.push(
+        Diagnostic::refused(N301, "the run does not fit into memory")
+            .at(scenario.particles.count_span, format!("{:.2} GiB of particles and bins", gib(needed)))
+            .found(format!("{:.2} GiB needed", gib(needed)))
+            .expected(format!("at most {:.2} GiB", gib(available)))
+            .help(format!("at most {fitting:.3e} particles fit")),
+    );
+}

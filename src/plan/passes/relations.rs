@@ -1,0 +1,237 @@
+//! Fields that follow from others by a conservation relation are not carried.
+//!
+//! Transport, exchange with the mean and instant reactions on totals are linear and keep constants,
+//! so a relation between initial concentrations, `U_b = α + Σ β_k U_k`, holds for ever. Relations are
+//! found by writing every initial concentration as a constant plus a combination of basis
+//! functions (indicators of conditions, coordinates, anything not linear) and eliminating.
+
+use super::Draft;
+use crate::maths::operator::{Binary, Unary};
+use crate::plan::tape::{Operation, Register, Tape};
+use std::collections::BTreeMap;
+
+/// A constant plus multiples of basis functions, which are named by a canonical text.
+#[derive(Debug, Clone, PartialEq, Default)]
+struct Affine {
+    constant: f64,
+    terms: BTreeMap<String, f64>,
+}
+
+/// Relations are accepted when they hold to this relative size.
+const TOLERANCE: f64 = 1e-12;
+
+pub(super) fn run(draft: &mut Draft) {
+    let forms: Vec<Affine> =
+        draft.plan.components.iter().map(|component| affine_of(&component.initial)).collect();
+    let mut kept: Vec<usize> = Vec::new();
+    let mut relations: Vec<Option<Relation>> = Vec::new();
+    for (idx, form) in forms.iter().enumerate() {
+        let relation = express(form, &kept, &forms);
+        if relation.is_none() {
+            kept.push(idx);
+        }
+        relations.push(relation);
+    }
+    if kept.len() == forms.len() {
+        return;
+    }
+    note(draft, &relations);
+    restore(draft, &relations, &kept);
+}
+
+/// `α + Σ β_k U_k` over kept components.
+struct Relation {
+    constant: f64,
+    terms: Vec<(usize, f64)>,
+}
+
+fn note(draft: &mut Draft, relations: &[Option<Relation>]) {
+    let name = |idx: usize| draft.plan.components[idx].name.clone();
+    let mut notes = Vec::new();
+    for (idx, relation) in relations.iter().enumerate() {
+        let Some(relation) = relation else { continue };
+        let terms: Vec<String> = relation
+            .terms
+            .iter()
+            .map(|(component, factor)| match *factor {
+                1.0 => format!(" + {}", name(*component)),
+                -1.0 => format!(" - {}", name(*component)),
+                factor => format!(" + {factor} {}", name(*component)),
+            })
+            .collect();
+        let why = if relation.terms.is_empty() {
+            format!("{} everywhere and always, restored at output", relation.constant)
+        } else {
+            format!("{}{} everywhere, restored at output", relation.constant, terms.concat())
+        };
+        notes.push((format!("carrying species `{}`", name(idx)), why));
+    }
+    for (what, why) in notes {
+        draft.leave_out(what, why);
+    }
+}
+
+/// Rewrites species over the kept components and drops the others.
+fn restore(draft: &mut Draft, relations: &[Option<Relation>], kept: &[usize]) {
+    let place = |component: usize| kept.iter().position(|known| *known == component);
+    for species in &mut draft.plan.species {
+        let mut terms: BTreeMap<usize, f64> = BTreeMap::new();
+        for (component, factor) in std::mem::take(&mut species.terms) {
+            match &relations[component] {
+                None => *terms.entry(component).or_default() += factor,
+                Some(relation) => {
+                    species.constant += factor * relation.constant;
+                    for (other, share) in &relation.terms {
+                        *terms.entry(*other).or_default() += factor * share;
+                    }
+                }
+            }
+        }
+        species.terms = terms.into_iter().filter_map(|(component, factor)| Some((place(component)?, factor))).collect();
+    }
+    let mut idx = 0;
+    draft.plan.components.retain(|_| {
+        idx += 1;
+        relations[idx - 1].is_none()
+    });
+}
+
+/// The relation of `form` to the kept components, if there is one.
+fn express(form: &Affine, kept: &[usize], forms: &[Affine]) -> Option<Relation> {
+    if form.terms.is_empty() {
+        return form.constant.is_finite().then_some(Relation { constant: form.constant, terms: Vec::new() });
+    }
+    if kept.is_empty() {
+        return None;
+    }
+    let mut names: Vec<&String> = form.terms.keys().collect();
+    kept.iter().for_each(|idx| names.extend(forms[*idx].terms.keys()));
+    names.sort_unstable();
+    names.dedup();
+    let entry = |form: &Affine, row: usize| form.terms.get(names[row]).copied().unwrap_or(0.0);
+    let matrix = nalgebra::DMatrix::from_fn(names.len(), kept.len(), |row, column| entry(&forms[kept[column]], row));
+    let target = nalgebra::DVector::from_fn(names.len(), |row, _| entry(form, row));
+    let scale = target.amax();
+    let solved = matrix.clone().svd(true, true).solve(&target, 1e-13 * matrix.amax()).ok()?;
+    let factors: Vec<f64> = solved.iter().map(|factor| snap(*factor)).collect();
+    let residual = (&matrix * nalgebra::DVector::from_vec(factors.clone()) - &target).amax();
+    if !(residual <= TOLERANCE * scale) {
+        return None;
+    }
+    let constant = kept.iter().zip(&factors).fold(form.constant, |sum, (idx, factor)| sum - factor * forms[*idx].constant);
+    let terms = kept.iter().copied().zip(factors).filter(|(_, factor)| *factor != 0.0).collect();
+    constant.is_finite().then_some(Relation { constant, terms })
+}
+
+/// The nearest whole number, if the factor is that up to rounding.
+fn snap(factor: f64) -> f64 {
+    let rounded = factor.round();
+    if (factor - rounded).abs() <= 1e-12 * rounded.abs().max(1.0) { rounded } else { factor }
+}
+
+fn affine_of(tape: &Tape) -> Affine {
+    let mut walker = Walker { tape, texts: Vec::new(), forms: Vec::new() };
+    for idx in 0..tape.operations.len() {
+        walker.visit(idx);
+    }
+    walker.forms.pop().unwrap_or_default()
+}
+
+/// Works forwards through a tape: a text and an affine form for every register.
+struct Walker<'t> {
+    tape: &'t Tape,
+    texts: Vec<String>,
+    forms: Vec<Affine>,
+}
+
+impl Walker<'_> {
+    fn visit(&mut self, idx: usize) {
+        let operation = self.tape.operations[idx];
+        let text = self.text(operation);
+        let form = self.form(operation).unwrap_or_else(|| Affine::atom(text.clone()));
+        self.texts.push(text);
+        self.forms.push(form);
+    }
+
+    /// A canonical text; hashed once it grows, so that shared registers stay small.
+    fn text(&self, operation: Operation) -> String {
+        let of = |register: Register| self.texts[usize::from(register)].as_str();
+        let text = match operation {
+            Operation::Constant(value) => format!("{:016x}", value.to_bits()),
+            Operation::Input(column) => format!("in{column}"),
+            Operation::Unary(operator, a) => format!("{operator:?}({})", of(a)),
+            Operation::Binary(operator, a, b) => format!("{operator:?}({},{})", of(a), of(b)),
+            Operation::Select(a, b, c) => format!("Select({},{},{})", of(a), of(b), of(c)),
+        };
+        if text.len() > 200 { blake3::hash(text.as_bytes()).to_hex().to_string() } else { text }
+    }
+
+    fn form(&self, operation: Operation) -> Option<Affine> {
+        let of = |register: Register| &self.forms[usize::from(register)];
+        match operation {
+            Operation::Constant(value) => Some(Affine { constant: value, terms: BTreeMap::new() }),
+            Operation::Unary(Unary::Negate, a) => Some(of(a).times(-1.0)),
+            Operation::Binary(Binary::Add, a, b) => Some(of(a).plus(of(b), 1.0)),
+            Operation::Binary(Binary::Subtract, a, b) => Some(of(a).plus(of(b), -1.0)),
+            Operation::Binary(Binary::Multiply, a, b) => match (of(a).as_constant(), of(b).as_constant()) {
+                (Some(factor), _) => Some(of(b).times(factor)),
+                (_, Some(factor)) => Some(of(a).times(factor)),
+                _ => None,
+            },
+            Operation::Binary(Binary::Divide, a, b) => of(b).as_constant().map(|divisor| of(a).times(1.0 / divisor)),
+            Operation::Select(condition, then, otherwise) => {
+                let difference = of(then).plus(of(otherwise), -1.0).as_constant()?;
+                let indicator = self.indicator(condition);
+                Some(of(otherwise).plus(&indicator, difference))
+            }
+            Operation::Input(_) | Operation::Unary(..) | Operation::Binary(..) => None,
+        }
+    }
+
+    /// One where a condition holds, zero elsewhere; `a >= b` is one minus `a < b`.
+    fn indicator(&self, condition: Register) -> Affine {
+        let of = |register: Register| self.texts[usize::from(register)].as_str();
+        let complement = |name: String| Affine { constant: 1.0, terms: BTreeMap::from([(name, -1.0)]) };
+        match self.tape.operations[usize::from(condition)] {
+            Operation::Binary(Binary::Less, a, b) => Affine::atom(format!("[{}<{}]", of(a), of(b))),
+            Operation::Binary(Binary::Greater, a, b) => Affine::atom(format!("[{}<{}]", of(b), of(a))),
+            Operation::Binary(Binary::GreaterEqual, a, b) => complement(format!("[{}<{}]", of(a), of(b))),
+            Operation::Binary(Binary::LessEqual, a, b) => complement(format!("[{}<{}]", of(b), of(a))),
+            Operation::Unary(Unary::Not, a) => {
+                Affine { constant: 1.0, terms: BTreeMap::new() }.plus(&self.indicator(a), -1.0)
+            }
+            _ => Affine::atom(format!("[{}]", of(condition))),
+        }
+    }
+}
+
+impl Affine {
+    fn atom(name: String) -> Self {
+        Self { constant: 0.0, terms: BTreeMap::from([(name, 1.0)]) }
+    }
+
+    fn as_constant(&self) -> Option<f64> {
+        self.terms.is_empty().then_some(self.constant)
+    }
+
+    fn times(&self, factor: f64) -> Self {
+        if factor == 0.0 {
+            return Self::default();
+        }
+        let terms = self.terms.iter().map(|(name, value)| (name.clone(), value * factor)).collect();
+        Self { constant: self.constant * factor, terms }
+    }
+
+    fn plus(&self, other: &Self, factor: f64) -> Self {
+        let mut sum = self.clone();
+        sum.constant += other.constant * factor;
+        for (name, value) in &other.terms {
+            let entry = sum.terms.entry(name.clone()).or_default();
+            *entry += value * factor;
+            if *entry == 0.0 {
+                sum.terms.remove(name);
+            }
+        }
+        sum
+    }
+}
