@@ -8,6 +8,7 @@ pub mod engine;
 pub mod maths;
 pub mod measure;
 pub mod plan;
+pub mod report;
 pub mod scenario;
 pub mod source;
 pub mod syntax;

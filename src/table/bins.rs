@@ -56,4 +56,9 @@ impl Grid {
     pub fn centres(&self, axis: usize) -> Option<&[f64]> {
         self.axes[axis].as_ref().map(|(centres, _)| centres.as_slice())
     }
+
+    /// Rows between two bins that are neighbours along a scene axis.
+    pub fn stride(&self, axis: usize) -> Option<usize> {
+        self.axes[axis].as_ref().map(|(_, stride)| *stride)
+    }
 }

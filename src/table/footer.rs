@@ -5,7 +5,7 @@
 
 use super::record::Record;
 use super::schema::Column;
-use super::unit::{dimension_of, exponent, si_text};
+use super::unit::{exponent, si_text, value_dimension};
 use crate::plan::{OutputKind, Plan, Quantity};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -169,7 +169,7 @@ fn parameters(record: &Record) -> Vec<Parameter> {
 fn species(plan: &Plan, record: &Record) -> Vec<Species> {
     let one = |(idx, species): (usize, &crate::plan::Species)| Species {
         name: species.name.clone(),
-        unit: si_text(dimension_of(plan, OutputKind::Profile, Quantity::Species(idx), 0)),
+        unit: si_text(value_dimension(plan, OutputKind::Profile, Quantity::Species(idx), 0)),
         doc: doc_of(record, &species.name).map(str::to_owned),
     };
     plan.species.iter().enumerate().map(one).collect()

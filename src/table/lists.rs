@@ -35,6 +35,7 @@ pub fn errors(rows: &[ErrorRow]) -> Vec<ArrayRef> {
         words(rows.iter().map(|row| Some(row.species_a.as_str()))),
         words(rows.iter().map(|row| row.species_b.as_deref())),
         Arc::new(UInt64Array::from_iter_values(rows.iter().map(|row| row.n))),
+        Arc::new(UInt64Array::from_iter_values(rows.iter().map(|row| row.n_empty))),
         norm(|norms| norms.l1),
         norm(|norms| norms.l2),
         norm(|norms| norms.linf),
@@ -43,6 +44,7 @@ pub fn errors(rows: &[ErrorRow]) -> Vec<ArrayRef> {
         ratio(|norms| norms.l2),
         ratio(|norms| norms.linf),
         ratio(|norms| norms.rmse),
+        Arc::new(rows.iter().map(|row| row.noise.and_then(finite)).collect::<Float64Array>()),
         words(rows.iter().map(|row| Some(row.unit.as_str()))),
     ]
 }

@@ -151,6 +151,7 @@ pub fn errors(path: &Path) -> Result<Vec<ErrorRow>, TableError> {
                 species_a: table.word("species_a", row)?.unwrap_or_default(),
                 species_b: table.word("species_b", row)?,
                 n: table.u64("n", row)?,
+                n_empty: table.u64("n_empty", row)?,
                 norms: norms(&table, "", row)?.unwrap_or(Norms {
                     l1: f64::NAN,
                     l2: f64::NAN,
@@ -158,6 +159,7 @@ pub fn errors(path: &Path) -> Result<Vec<ErrorRow>, TableError> {
                     rmse: f64::NAN,
                 }),
                 relative: norms(&table, "relative_", row)?,
+                noise: table.real("noise", row)?,
                 unit: table.word("unit", row)?.unwrap_or_default(),
             });
         }

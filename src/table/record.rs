@@ -141,10 +141,14 @@ pub struct ErrorRow {
     pub species_b: Option<String>,
     /// Values compared: bins that are not empty, times.
     pub n: u64,
+    /// Bins left out because they hold no particle.
+    pub n_empty: u64,
     /// SI; `unit` is that of the compared field.
     pub norms: Norms,
     /// The same divided by the norm of the reference over the same bins; `None` where that is zero.
     pub relative: Option<Norms>,
+    /// The L2 norm that sampling noise alone would give.
+    pub noise: Option<f64>,
     pub unit: String,
 }
 

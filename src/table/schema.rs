@@ -180,6 +180,7 @@ fn error_columns() -> Vec<Column> {
         plain("species_a", word(), "species, or the first of a pair"),
         plain("species_b", word(), "the second species of a pair").or_null(),
         plain("n", DataType::UInt64, "values compared: bins that are not empty, times"),
+        plain("n_empty", DataType::UInt64, "bins left out because they hold no particle"),
         norm("l1", "integral of |result - reference|: unit times m per axis"),
         norm("l2", "root of the integral of (result - reference)^2: unit times m^(1/2) per axis"),
         norm("linf", "largest |result - reference|"),
@@ -188,6 +189,7 @@ fn error_columns() -> Vec<Column> {
         ratio("relative_l2", "l2 / l2 of the reference"),
         ratio("relative_linf", "linf / linf of the reference"),
         ratio("relative_rmse", "rmse / root mean square of the reference"),
+        norm("noise", "l2 that sampling noise alone would give: unit times m^(1/2) per axis"),
         plain("unit", word(), "SI unit of the compared values"),
     ]
 }

@@ -56,7 +56,7 @@ pub fn exponent(sixtieths: i16) -> f64 {
 ///
 /// Concentration mol/m³ or kg/m³; covariance the product of two; total concentration × m^d;
 /// mixing the product of two × m^d.
-pub fn dimension_of(plan: &Plan, kind: OutputKind, quantity: Quantity, n_axes: usize) -> Dimension {
+pub fn value_dimension(plan: &Plan, kind: OutputKind, quantity: Quantity, n_axes: usize) -> Dimension {
     let concentration = match quantity {
         Quantity::Species(s) => concentration_of(plan, s),
         Quantity::Pair(a, b) => product(concentration_of(plan, a), concentration_of(plan, b)),
@@ -73,7 +73,7 @@ pub fn dimension_of(plan: &Plan, kind: OutputKind, quantity: Quantity, n_axes: u
 
 /// The unit in which `output` is written for `quantity`.
 pub fn value_unit(plan: &Plan, output: &Output, quantity: Quantity, n_axes: usize) -> ValueUnit {
-    let dimension = dimension_of(plan, output.kind, quantity, n_axes);
+    let dimension = value_dimension(plan, output.kind, quantity, n_axes);
     match &output.unit {
         Some(unit) => ValueUnit { text: unit.text.clone(), dimension, factor: unit.factor },
         None => ValueUnit { text: si_text(dimension), dimension, factor: 1.0 },

@@ -170,8 +170,10 @@ pub fn errors() -> Vec<ErrorRow> {
         species_a: "A".to_owned(),
         species_b: species_b.map(str::to_owned),
         n: 5,
+        n_empty: 1,
         norms: Norms { l1: 0.5, l2: 0.25, linf: 2.0, rmse: 1.0 },
         relative,
+        noise: Some(0.125),
         unit: "mol/m^3".to_owned(),
     };
     vec![

@@ -37,8 +37,9 @@ TABLES = {
     "total": HEAD + [("species", WORD, ""), ("amount", REAL, ROW)] + TAIL,
     "mixing": HEAD + PAIR + [("m", REAL, ROW), ("m_mean", REAL, ROW), ("m_cov", REAL, ROW), ("gamma", REAL, "1")] + TAIL,
     "particles": HEAD + [("particle", "uint64", "")] + PLACE + [("species", WORD, ""), ("concentration", REAL, ROW)] + TAIL,
-    "errors": HEAD + [("reference", WORD, ""), ("output", "uint16", ""), ("kind", WORD, "")] + PAIR + [("n", "uint64", "")]
-    + [(name, REAL, ROW) for name in NORMS] + [("relative_" + name, REAL, "1") for name in NORMS] + [("unit", WORD, "")],
+    "errors": HEAD + [("reference", WORD, ""), ("output", "uint16", ""), ("kind", WORD, "")] + PAIR + [("n", "uint64", ""), ("n_empty", "uint64", "")]
+    + [(name, REAL, ROW) for name in NORMS] + [("relative_" + name, REAL, "1") for name in NORMS]
+    + [("noise", REAL, ROW), ("unit", WORD, "")],
 }
 TABLES["map"] = TABLES["profile"]
 

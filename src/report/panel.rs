@@ -1,0 +1,211 @@
+//! One panel: axes, marks, its own key.
+//!
+//! Owns how a panel is drawn inside its box. May use `canvas`, `scale`, `color`, `heat`. It
+//! deliberately knows no species: texts and numbers come ready.
+
+use super::canvas::{Canvas, Lettering, Pattern, Pen, text_width};
+use super::color::{GRID, INK, Rgb, WHITE};
+use super::heat::Heat;
+use super::scale::Scale;
+use plotters::style::text_anchor::{HPos, VPos};
+
+/// How the points of a mark are shown.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Look {
+    Dots,
+    Line(Pattern),
+}
+
+/// A series in the units of the axes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mark {
+    pub points: Vec<(f64, f64)>,
+    pub color: Rgb,
+    pub look: Look,
+}
+
+/// A sample with its text.
+#[derive(Debug, Clone, PartialEq)]
+pub struct KeyEntry {
+    pub text: String,
+    pub color: Rgb,
+    pub look: Look,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Panel {
+    pub title: String,
+    pub x_label: String,
+    pub y_label: String,
+    pub x: Scale,
+    pub y: Scale,
+    pub marks: Vec<Mark>,
+    pub heat: Option<Heat>,
+    /// Only where the page's key does not tell the series apart.
+    pub key: Vec<KeyEntry>,
+}
+
+/// Left, top, right, bottom on the page.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    pub left: f64,
+    pub top: f64,
+    pub right: f64,
+    pub bottom: f64,
+}
+
+impl Frame {
+    pub fn place(&self, x: &Scale, y: &Scale, point: (f64, f64)) -> (f64, f64) {
+        (
+            self.left + x.fraction(point.0) * (self.right - self.left),
+            self.bottom - y.fraction(point.1) * (self.bottom - self.top),
+        )
+    }
+}
+
+const SMALL: f64 = 11.0;
+const MIDDLE: f64 = 12.0;
+
+/// Letters in the ink of axes.
+pub fn lettering(size: f64, horizontal: HPos, vertical: VPos) -> Lettering {
+    Lettering { size, color: INK, horizontal, vertical, is_upright: false }
+}
+
+/// Draws a panel into its box.
+pub fn draw(canvas: &mut Canvas, panel: &Panel, outer: Frame) {
+    let color_bar = if panel.heat.is_some() { 58.0 } else { 0.0 };
+    let inner = Frame {
+        left: outer.left + 62.0,
+        top: outer.top + 28.0,
+        right: outer.right - 14.0 - color_bar,
+        bottom: outer.bottom - 44.0,
+    };
+    let title = Lettering { size: 13.0, ..lettering(13.0, HPos::Left, VPos::Bottom) };
+    canvas.letters(&panel.title, (inner.left, inner.top - 4.0), title);
+    grid(canvas, panel, inner);
+    if let Some(heat) = &panel.heat {
+        heat.draw(canvas, inner);
+    }
+    for mark in &panel.marks {
+        draw_mark(canvas, panel, mark, inner);
+    }
+    axes(canvas, panel, inner);
+    labels(canvas, panel, inner, outer);
+    key(canvas, panel, inner);
+}
+
+/// Lines behind the marks at the named ticks.
+fn grid(canvas: &mut Canvas, panel: &Panel, frame: Frame) {
+    if panel.heat.is_some() {
+        return;
+    }
+    let pen = Pen::new(GRID, 0.6);
+    for (value, _) in panel.x.ticks(6).iter().filter(|(_, text)| !text.is_empty()) {
+        let (x, _) = frame.place(&panel.x, &panel.y, (*value, panel.y.low));
+        canvas.line(&[(x, frame.top), (x, frame.bottom)], pen);
+    }
+    for (value, _) in panel.y.ticks(5).iter().filter(|(_, text)| !text.is_empty()) {
+        let (_, y) = frame.place(&panel.x, &panel.y, (panel.x.low, *value));
+        canvas.line(&[(frame.left, y), (frame.right, y)], pen);
+    }
+}
+
+fn draw_mark(canvas: &mut Canvas, panel: &Panel, mark: &Mark, frame: Frame) {
+    let place = |point: &(f64, f64)| frame.place(&panel.x, &panel.y, *point);
+    let is_drawable = |point: &(f64, f64)| point.0.is_finite() && point.1.is_finite();
+    match mark.look {
+        Look::Dots => {
+            let radius = if mark.points.len() > 120 { 1.5 } else { 2.2 };
+            let pen = Pen { opacity: 0.5, ..Pen::new(mark.color, 0.0) };
+            for point in mark.points.iter().map(place).filter(is_drawable) {
+                canvas.dot(point, radius, pen);
+            }
+        }
+        Look::Line(pattern) => {
+            let points: Vec<_> = mark.points.iter().map(place).collect();
+            // A value that is missing or that a log axis cannot show interrupts the line.
+            for piece in points.split(|point| !is_drawable(point)) {
+                canvas.broken_line(piece, pattern, Pen::new(mark.color, 1.3));
+            }
+        }
+    }
+}
+
+fn axes(canvas: &mut Canvas, panel: &Panel, frame: Frame) {
+    let pen = Pen::new(INK, 0.9);
+    let Frame { left, top, right, bottom } = frame;
+    canvas.line(&[(left, top), (right, top), (right, bottom), (left, bottom), (left, top)], pen);
+    for (value, text) in panel.x.ticks(6) {
+        let (x, _) = frame.place(&panel.x, &panel.y, (value, panel.y.low));
+        let length = if text.is_empty() { 2.5 } else { 4.0 };
+        canvas.line(&[(x, bottom), (x, bottom + length)], pen);
+        canvas.letters(&text, (x, bottom + 6.0), lettering(SMALL, HPos::Center, VPos::Top));
+    }
+    for (value, text) in panel.y.ticks(5) {
+        let (_, y) = frame.place(&panel.x, &panel.y, (panel.x.low, value));
+        let length = if text.is_empty() { 2.5 } else { 4.0 };
+        canvas.line(&[(left - length, y), (left, y)], pen);
+        canvas.letters(&text, (left - 6.0, y), lettering(SMALL, HPos::Right, VPos::Center));
+    }
+}
+
+fn labels(canvas: &mut Canvas, panel: &Panel, inner: Frame, outer: Frame) {
+    let middle = (0.5 * (inner.left + inner.right), 0.5 * (inner.top + inner.bottom));
+    let below = lettering(MIDDLE, HPos::Center, VPos::Top);
+    canvas.letters(&panel.x_label, (middle.0, inner.bottom + 23.0), below);
+    let beside = Lettering { is_upright: true, ..lettering(MIDDLE, HPos::Center, VPos::Top) };
+    canvas.letters(&panel.y_label, (outer.left + 4.0, middle.1), beside);
+}
+
+/// In the corner of the panel that holds the fewest points.
+fn key(canvas: &mut Canvas, panel: &Panel, frame: Frame) {
+    if panel.key.is_empty() {
+        return;
+    }
+    let width = panel.key.iter().map(|entry| text_width(&entry.text, SMALL)).fold(0.0, f64::max) + 36.0;
+    let height = 16.0 * panel.key.len() as f64 + 6.0;
+    let (left, top) = emptiest_corner(panel, frame, width, height);
+    let paper = Pen { opacity: 0.85, ..Pen::new(WHITE, 0.0) };
+    canvas.rectangle((left, top), (left + width, top + height), paper);
+    for (row, entry) in panel.key.iter().enumerate() {
+        draw_entry(canvas, entry, (left + 6.0, top + 11.0 + 16.0 * row as f64));
+    }
+}
+
+fn emptiest_corner(panel: &Panel, frame: Frame, width: f64, height: f64) -> (f64, f64) {
+    let (left, right) = (frame.left + 5.0, frame.right - width - 5.0);
+    let (top, bottom) = (frame.top + 5.0, frame.bottom - height - 5.0);
+    let n_inside = |corner: (f64, f64)| {
+        let points = panel.marks.iter().flat_map(|mark| &mark.points);
+        let places = points.map(|point| frame.place(&panel.x, &panel.y, *point));
+        places
+            .filter(|(x, y)| {
+                (corner.0..corner.0 + width).contains(x) && (corner.1..corner.1 + height).contains(y)
+            })
+            .count()
+    };
+    let corners = [(right, top), (left, top), (right, bottom), (left, bottom)];
+    corners.into_iter().min_by_key(|corner| n_inside(*corner)).unwrap_or(corners[0])
+}
+
+/// A sample and its text, `at` the middle of its left edge. Returns the width it takes.
+pub fn draw_entry(canvas: &mut Canvas, entry: &KeyEntry, at: (f64, f64)) -> f64 {
+    let sample = match entry.look {
+        Look::Dots => {
+            canvas.dot((at.0 + 6.0, at.1), 3.2, Pen::new(entry.color, 0.0));
+            14.0
+        }
+        Look::Line(pattern) => {
+            canvas.broken_line(&[at, (at.0 + 24.0, at.1)], pattern, Pen::new(entry.color, 1.5));
+            29.0
+        }
+    };
+    canvas.letters(&entry.text, (at.0 + sample, at.1), lettering(SMALL, HPos::Left, VPos::Center));
+    entry_width(entry)
+}
+
+/// The room of a sample with its text and the gap after it.
+pub fn entry_width(entry: &KeyEntry) -> f64 {
+    let sample = if entry.look == Look::Dots { 14.0 } else { 29.0 };
+    sample + text_width(&entry.text, SMALL) + 16.0
+}

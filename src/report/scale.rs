@@ -1,0 +1,181 @@
+//! From values to places along an axis, and the numbers written beside it.
+//!
+//! Owns ticks and their text. May use `maths`. It deliberately knows no page.
+
+use crate::maths::scalar::log10;
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Spacing {
+    Linear,
+    Log,
+}
+
+/// A range of values with its spacing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scale {
+    pub low: f64,
+    pub high: f64,
+    pub spacing: Spacing,
+}
+
+impl Scale {
+    /// Covers the values with a margin; zero is kept as an end if the values reach it. Log spacing
+    /// if asked for and possible.
+    pub fn covering(values: impl Iterator<Item = f64>, spacing: Spacing) -> Self {
+        let is_usable = |value: &f64| value.is_finite() && (spacing == Spacing::Linear || *value > 0.0);
+        let ends = values.filter(is_usable).fold(None, |ends: Option<(f64, f64)>, value| {
+            Some(ends.map_or((value, value), |(low, high)| (low.min(value), high.max(value))))
+        });
+        match (ends, spacing) {
+            (None, _) => Self { low: 0.0, high: 1.0, spacing: Spacing::Linear },
+            (Some((low, high)), Spacing::Log) => Self { low: low / 1.15, high: high * 1.15, spacing },
+            (Some((low, high)), Spacing::Linear) => Self::padded(low, high),
+        }
+    }
+
+    fn padded(low: f64, high: f64) -> Self {
+        let span = if high > low { high - low } else { high.abs().max(1e-300) };
+        // Noise below zero of less than a fiftieth of the range does not move the end from zero by more.
+        let low = if low >= 0.0 && low < 0.5 * high { 0.0 } else { low - 0.06 * span };
+        let high = if high <= 0.0 && high > 0.5 * low { 0.0 } else { high + 0.06 * span };
+        Self { low, high, spacing: Spacing::Linear }
+    }
+
+    /// 0 at the low end, 1 at the high end; not finite for what a log axis cannot show.
+    pub fn fraction(&self, value: f64) -> f64 {
+        match self.spacing {
+            Spacing::Linear => (value - self.low) / (self.high - self.low),
+            Spacing::Log if value > 0.0 => log10(value / self.low) / log10(self.high / self.low),
+            Spacing::Log => f64::NAN,
+        }
+    }
+
+    /// Places and texts of the ticks, about `wanted` of them; a log axis has unnamed ones between.
+    pub fn ticks(&self, wanted: usize) -> Vec<(f64, String)> {
+        match self.spacing {
+            Spacing::Linear => linear_ticks(self.low, self.high, wanted),
+            Spacing::Log => log_ticks(self.low, self.high),
+        }
+    }
+}
+
+/// 10^k, rounded correctly.
+pub fn power_of_ten(exponent: i32) -> f64 {
+    format!("1e{exponent}").parse().unwrap_or(f64::INFINITY)
+}
+
+fn linear_ticks(low: f64, high: f64, wanted: usize) -> Vec<(f64, String)> {
+    let rough = (high - low) / wanted.max(1) as f64;
+    let exponent = log10(rough).floor() as i32;
+    let unit = power_of_ten(exponent);
+    if !(unit > 0.0 && unit.is_finite()) {
+        return Vec::new();
+    }
+    // The nearest of 1, 2, 5, 10 by ratio: limits at √2, √10 and √50.
+    let multiple = match rough / unit {
+        ratio if ratio < 1.414 => 1.0,
+        ratio if ratio < 3.162 => 2.0,
+        ratio if ratio < 7.071 => 5.0,
+        _ => 10.0,
+    };
+    let step = multiple * unit;
+    let (first, last) = ((low / step - 1e-9).ceil() as i64, (high / step + 1e-9).floor() as i64);
+    let step_exponent = if multiple == 10.0 { exponent + 1 } else { exponent };
+    let largest = low.abs().max(high.abs());
+    (first..=last.min(first + 50))
+        .map(|k| (k as f64 * step, number(k as f64 * step, step_exponent, largest)))
+        .collect()
+}
+
+/// Decimal digits down to the step; powers of ten beyond what reads well.
+fn number(value: f64, step_exponent: i32, largest: f64) -> String {
+    if value == 0.0 {
+        return "0".to_owned();
+    }
+    if largest >= 1e5 || step_exponent < -4 {
+        let exponent = log10(value.abs()).floor() as i32;
+        let digits = (exponent - step_exponent).clamp(0, 6) as usize;
+        let mantissa = format!("{:.digits$}", value / power_of_ten(exponent));
+        return format!("{}·10{}", minus(&mantissa), superscript(exponent));
+    }
+    let digits = (-step_exponent).max(0) as usize;
+    minus(&format!("{value:.digits$}"))
+}
+
+fn minus(text: &str) -> String {
+    text.replace('-', "−")
+}
+
+fn log_ticks(low: f64, high: f64) -> Vec<(f64, String)> {
+    let (first, last) = (log10(low).floor() as i32, log10(high).ceil() as i32);
+    let n_decades = last - first;
+    let every = (n_decades / 6 + 1).max(1);
+    let is_narrow = log10(high / low) < 1.6;
+    let mut ticks = Vec::new();
+    for exponent in first..=last {
+        for digit in 1..10 {
+            let value = f64::from(digit) * power_of_ten(exponent);
+            if value < low || value > high {
+                continue;
+            }
+            let is_named =
+                digit == 1 && exponent.rem_euclid(every) == 0 || is_narrow && matches!(digit, 2 | 5);
+            ticks.push((value, if is_named { short(value, exponent) } else { String::new() }));
+        }
+    }
+    ticks
+}
+
+fn short(value: f64, exponent: i32) -> String {
+    match exponent {
+        0..=3 => format!("{value:.0}"),
+        -3..=-1 => format!("{value:.*}", exponent.unsigned_abs() as usize),
+        _ if value / power_of_ten(exponent) < 1.5 => format!("10{}", superscript(exponent)),
+        _ => format!("{:.0}·10{}", value / power_of_ten(exponent), superscript(exponent)),
+    }
+}
+
+/// An exponent in raised digits.
+pub fn superscript(exponent: i32) -> String {
+    let raised = |digit: char| match digit {
+        '-' => '⁻',
+        '1' => '¹',
+        '2' => '²',
+        '3' => '³',
+        '0' => '⁰',
+        other => char::from_u32('⁴' as u32 + other as u32 - '4' as u32).unwrap_or(other),
+    };
+    exponent.to_string().chars().map(raised).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn texts(low: f64, high: f64, spacing: Spacing) -> Vec<String> {
+        let ticks = Scale { low, high, spacing }.ticks(6);
+        ticks.into_iter().map(|(_, text)| text).filter(|text| !text.is_empty()).collect()
+    }
+
+    #[test]
+    fn ticks_are_round_numbers() {
+        assert_eq!(texts(-7.5, 7.5, Spacing::Linear), ["−6", "−4", "−2", "0", "2", "4", "6"]);
+        assert_eq!(texts(0.0, 0.21, Spacing::Linear), ["0.00", "0.05", "0.10", "0.15", "0.20"].map(zero));
+        assert_eq!(texts(0.0, 2.1e6, Spacing::Linear), ["0", "5·10⁵", "1.0·10⁶", "1.5·10⁶", "2.0·10⁶"]);
+        assert_eq!(texts(0.02, 40.0, Spacing::Log), ["0.1", "1", "10"]);
+        assert_eq!(texts(1e-9, 1e-6, Spacing::Log), ["10⁻⁹", "10⁻⁸", "10⁻⁷", "10⁻⁶"]);
+    }
+
+    fn zero(text: &str) -> String {
+        if text == "0.00" { "0".to_owned() } else { text.to_owned() }
+    }
+
+    #[test]
+    fn hostile_ranges_give_no_endless_ticks() {
+        for (low, high) in [(0.0, 5e-324), (-1e308, 1e308), (1.0, 1.0), (f64::NAN, 1.0)] {
+            assert!(Scale { low, high, spacing: Spacing::Linear }.ticks(5).len() < 60);
+        }
+        let none = Scale::covering([f64::NAN].into_iter(), Spacing::Log);
+        assert_eq!((none.low, none.high), (0.0, 1.0));
+    }
+}
