@@ -228,6 +228,8 @@ mod tests {
             species_a: "A".to_owned(),
             species_b: Some("B".to_owned()),
             n: 300,
+            n_empty: 0,
+            noise: None,
             norms,
             relative,
             unit: "mol/m^3".to_owned(),
