@@ -16,6 +16,7 @@ pub mod table;
 pub mod units;
 
 use diagnostic::{Diagnostic, any_fatal};
+use plan::compile::{Compiled, Options, compile};
 use scenario::{Scenario, Settings};
 use source::{FileId, Sources};
 use syntax::tree;
@@ -28,14 +29,21 @@ pub struct Checked {
     pub file: tree::File,
     /// Absent if the scene is wrong.
     pub scenario: Option<Scenario>,
+    /// Absent if the scene is wrong or cannot run as asked.
+    pub compiled: Option<Compiled>,
     pub diagnostics: Vec<Diagnostic>,
 }
 
 /// Takes the first file of `sources` as far as it goes. Ends for every text, and never panics.
-pub fn check(mut sources: Sources, settings: &Settings) -> Checked {
+pub fn check(mut sources: Sources, settings: &Settings, options: &Options) -> Checked {
     let (file, mut diagnostics) = syntax::parse(FileId(0), &sources.file(FileId(0)).text);
     let has_syntax_errors = any_fatal(&diagnostics);
     let (scenario, more) = scenario::resolve(&file, &mut sources, settings, has_syntax_errors);
     diagnostics.extend(more);
-    Checked { sources, file, scenario, diagnostics }
+    let compiled = scenario.as_ref().and_then(|scenario| {
+        let (compiled, more) = compile(scenario, options);
+        diagnostics.extend(more);
+        compiled
+    });
+    Checked { sources, file, scenario, compiled, diagnostics }
 }

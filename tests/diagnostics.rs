@@ -2,11 +2,12 @@
 //!
 //! Each `tests/diagnostics/<phase>/<the_mistake>.lam` has its rendered messages beside it in a `.txt`.
 //! A line `# expect: U104 D001` demands these codes; a line `# set: name=value` is what `--set` would
-//! do. `LAMELLA_BLESS=1` (`make bless`) writes the
+//! do; `# memory: 1000` is a machine of so many bytes. `LAMELLA_BLESS=1` (`make bless`) writes the
 //! messages anew; look at the difference before you commit it.
 
 use lamella::diagnostic::Diagnostic;
 use lamella::diagnostic::render::{self, Colour};
+use lamella::plan::compile::Options;
 use lamella::scenario::Settings;
 use lamella::source::Sources;
 use std::path::{Path, PathBuf};
@@ -45,8 +46,10 @@ fn check(path: &Path) -> (Vec<Diagnostic>, Sources) {
         let (name, value) = setting.split_once('=').expect("name=value");
         (name.trim().to_owned(), value.trim().to_owned())
     });
+    let memory = directives(&text, "# memory:").next().map(|bytes| bytes.parse().expect("a number of bytes"));
+    let options = Options { memory, ..Options::default() };
     let settings = Settings { set: set.collect(), ..Settings::default() };
-    let checked = lamella::check(Sources::single(name(path), text.clone()), &settings);
+    let checked = lamella::check(Sources::single(name(path), text.clone()), &settings, &options);
     (checked.diagnostics, checked.sources)
 }
 

@@ -28,7 +28,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
 
 /// A file that cannot be read does not keep the others from being checked.
 fn check_one(path: &Path, settings: &Settings, terminal: &Terminal) -> Exit {
-    let checked = match load::check(path, settings) {
+    let checked = match load::load(path, settings, false) {
         Ok(checked) => checked,
         Err(stopped) => return terminal.stopped(stopped),
     };

@@ -1,16 +1,18 @@
-//! From a path to a checked scene; what `check`, `plan` and `run` have in common.
+//! From a path to a plan; what `check`, `plan` and `run` have in common.
 
-use super::Stopped;
 use super::files::{display_name, read_scene};
+use super::{Stopped, machine};
 use lamella::Checked;
+use lamella::plan::compile::Options;
 use lamella::scenario::Settings;
 use lamella::source::Sources;
 use std::path::Path;
 
 /// Reads a scene and takes it as far as it goes.
-pub(crate) fn check(path: &Path, settings: &Settings) -> Result<Checked, Stopped> {
+pub(crate) fn load(path: &Path, settings: &Settings, without_passes: bool) -> Result<Checked, Stopped> {
     let text = read_scene(path)?;
-    Ok(lamella::check(Sources::single(display_name(path), text), settings))
+    let options = Options { without_passes, memory: machine::available_memory() };
+    Ok(lamella::check(Sources::single(display_name(path), text), settings, &options))
 }
 
 /// `name=value` of `--set`; the value is an expression of the language.

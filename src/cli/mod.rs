@@ -11,7 +11,9 @@ mod fmt;
 #[allow(dead_code)]
 mod interrupt;
 mod load;
+mod machine;
 mod new;
+mod plan;
 #[allow(dead_code)]
 mod progress;
 #[allow(dead_code)]
@@ -72,6 +74,7 @@ enum Command {
     New(new::Arguments),
     Check(check::Arguments),
     Fmt(fmt::Arguments),
+    Plan(plan::Arguments),
     Explain(explain::Arguments),
     Completions(completions::Arguments),
 }
@@ -108,6 +111,7 @@ pub(crate) fn main() -> ExitCode {
     let result = match &arguments.command {
         Command::Check(check) => check::run(check, &terminal),
         Command::Fmt(fmt) => fmt::run(fmt, &terminal),
+        Command::Plan(plan) => plan::run(plan, &terminal),
         Command::New(new) => new::run(new, &terminal),
         Command::Explain(explain) => explain::run(explain, &terminal),
         Command::Completions(completions) => completions::run(completions, &terminal),

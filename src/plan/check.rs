@@ -18,7 +18,9 @@ impl Plan {
         let n_axes = self.axes.len();
         require((1..=3).contains(&n_axes), || format!("{n_axes} axes: 1 to 3 are possible"))?;
         require(self.walk.drift.len() == n_axes, || "one drift per axis is needed".into())?;
-        require(self.walk.spread.len() == n_axes * (n_axes + 1) / 2, || "the spread is no lower triangle".into())?;
+        require(self.walk.spread.len() == n_axes * (n_axes + 1) / 2, || {
+            "the spread is no lower triangle".into()
+        })?;
         let entries = self.walk.drift.iter().chain(&self.walk.spread);
         require(entries.copied().all(f64::is_finite), || "the walk has entries that are no numbers".into())?;
         for (idx, axis) in self.axes.iter().enumerate() {
@@ -27,18 +29,22 @@ impl Plan {
             let extent = axis.high - axis.low;
             require(extent.is_finite() && extent > 0.0, || "an axis has no extent".into())?;
             require(axis.bins >= 1, || "an axis has no bins".into())?;
-            let n_periodic = [axis.low_side, axis.high_side].iter().filter(|side| **side == Side::Periodic).count();
+            let n_periodic =
+                [axis.low_side, axis.high_side].iter().filter(|side| **side == Side::Periodic).count();
             require(n_periodic != 1, || "a periodic side has no partner".into())?;
         }
         require(self.particles.count >= 1, || "no particles".into())?;
         require(self.particles.volume > 0.0, || "particles have no volume".into())?;
         let time = &self.time;
-        require(time.step > 0.0 && time.duration > 0.0 && time.n_steps >= 1, || "the run has no extent".into())
+        require(time.step > 0.0 && time.duration > 0.0 && time.n_steps >= 1, || {
+            "the run has no extent".into()
+        })
     }
 
     fn check_fields(&self) -> Result<(), String> {
         for component in &self.components {
-            check_tape(&component.initial).map_err(|reason| format!("component `{}`: {reason}", component.name))?;
+            check_tape(&component.initial)
+                .map_err(|reason| format!("component `{}`: {reason}", component.name))?;
         }
         for species in &self.species {
             let is_right = species.terms.iter().all(|(component, _)| *component < self.components.len());
@@ -48,7 +54,9 @@ impl Plan {
             let all = reaction.reactants.iter().chain(&reaction.products);
             let is_right = all.clone().all(|(species, nu)| *species < self.species.len() && *nu > 0.0);
             require(is_right, || format!("reaction `{}` is not well-formed", reaction.name))?;
-            require(!reaction.reactants.is_empty(), || format!("reaction `{}` has no reactant", reaction.name))?;
+            require(!reaction.reactants.is_empty(), || {
+                format!("reaction `{}` has no reactant", reaction.name)
+            })?;
         }
         Ok(())
     }

@@ -61,7 +61,8 @@ pub fn hash(plan: &Plan) -> String {
 impl Compiled {
     /// What was left out, as one message.
     pub fn left_out_note(&self) -> Diagnostic {
-        let list: Vec<String> = self.left_out.iter().map(|item| format!("{} ({})", item.what, item.why)).collect();
+        let list: Vec<String> =
+            self.left_out.iter().map(|item| format!("{} ({})", item.what, item.why)).collect();
         Diagnostic::remark(L010, format!("left out of this run: {}", list.join(", ")))
     }
 }

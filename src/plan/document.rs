@@ -58,9 +58,13 @@ pub fn write(compiled: &Compiled, sources: &[EmbeddedSource]) -> String {
 
 /// Reads a plan back; one sentence if the text is no plan, or not the one whose hash it carries.
 pub fn read(text: &str) -> Result<(Plan, Evaluation), String> {
-    let document: ReadDocument = serde_yaml::from_str(text).map_err(|error| format!("not a plan: {error}"))?;
+    let document: ReadDocument =
+        serde_yaml::from_str(text).map_err(|error| format!("not a plan: {error}"))?;
     if document.document != DOCUMENT_VERSION {
-        return Err(format!("a plan document of version {}; this program reads {DOCUMENT_VERSION}", document.document));
+        return Err(format!(
+            "a plan document of version {}; this program reads {DOCUMENT_VERSION}",
+            document.document
+        ));
     }
     document.plan.check()?;
     if hash(&document.plan) != document.plan_hash {

@@ -71,13 +71,15 @@ fn side(side: Side) -> &'static str {
 }
 
 fn scene_lines(plan: &Plan) -> Vec<String> {
-    let mut lines = vec![format!(
-        "{} fluid particles, {:?} placement, seed {}",
-        grouped(plan.particles.count),
-        plan.particles.placement,
-        plan.seed
-    )
-    .to_lowercase()];
+    let mut lines = vec![
+        format!(
+            "{} fluid particles, {:?} placement, seed {}",
+            grouped(plan.particles.count),
+            plan.particles.placement,
+            plan.seed
+        )
+        .to_lowercase(),
+    ];
     for (idx, axis) in plan.axes.iter().enumerate() {
         let b = &plan.walk.spread[idx * (idx + 1) / 2..][..=idx];
         let dispersion = 0.5 * b.iter().map(|b| b * b).sum::<f64>();
@@ -147,7 +149,9 @@ fn field_lines(plan: &Plan) -> Vec<String> {
             lines.push(format!("zone {}: fraction {}, {rate}, {stored}", zone.name, number(zone.fraction)));
         }
         if mixing.is_well_mixed {
-            lines.push("every zone is instant: particles carry an unmixed value, means are taken at outputs".into());
+            lines.push(
+                "every zone is instant: particles carry an unmixed value, means are taken at outputs".into(),
+            );
         }
     }
     for species in &plan.species {
@@ -161,7 +165,12 @@ fn field_lines(plan: &Plan) -> Vec<String> {
             .iter()
             .map(|(component, factor)| format!(" + {} {}", number(*factor), plan.components[*component].name))
             .collect();
-        lines.push(format!("{} before reaction = {}{}", species.name, number(species.constant), terms.concat()));
+        lines.push(format!(
+            "{} before reaction = {}{}",
+            species.name,
+            number(species.constant),
+            terms.concat()
+        ));
     }
     for reaction in &plan.reactions {
         let side = |list: &[(usize, f64)]| {
@@ -212,7 +221,11 @@ fn cost_lines(compiled: &Compiled) -> Vec<String> {
     vec![
         format!("{} particle-steps", number(cost.particle_steps)),
         format!("about {} s on one core", number((cost.cpu_seconds * 100.0).round() / 100.0)),
-        format!("{} MiB of particle state, {} MiB of sums over bins", mib(cost.state_bytes), mib(cost.bin_bytes)),
+        format!(
+            "{} MiB of particle state, {} MiB of sums over bins",
+            mib(cost.state_bytes),
+            mib(cost.bin_bytes)
+        ),
     ]
 }
 

@@ -88,11 +88,17 @@ fn travel(scenario: &Scenario, plan: &Plan, limits: &mut Vec<Limit>, diagnostics
         }
         if advective + 3.0 * dispersive > extent {
             diagnostics.push(
-                Diagnostic::warning(N104, format!("a step carries particles across the whole domain along {}", axis_name(axis.index)))
-                    .at(scenario.run.step_span, format!("{step} s"))
-                    .found(format!("{:.3e} m in a step", advective + 3.0 * dispersive))
-                    .expected(format!("less than the extent, {extent:.3e} m"))
-                    .note("positions stay right in law; what happens between two outputs is not resolved"),
+                Diagnostic::warning(
+                    N104,
+                    format!(
+                        "a step carries particles across the whole domain along {}",
+                        axis_name(axis.index)
+                    ),
+                )
+                .at(scenario.run.step_span, format!("{step} s"))
+                .found(format!("{:.3e} m in a step", advective + 3.0 * dispersive))
+                .expected(format!("less than the extent, {extent:.3e} m"))
+                .note("positions stay right in law; what happens between two outputs is not resolved"),
             );
         }
     }
@@ -131,7 +137,8 @@ fn particles_per_bin(
             .help(format!("use at least {needed:e} particles, or at most {affordable} bins in all"))
     };
     if per_bin < TOO_FEW_PER_BIN {
-        diagnostics.push(place(Diagnostic::refused(N201, "bins without particles have no mean to exchange with")));
+        diagnostics
+            .push(place(Diagnostic::refused(N201, "bins without particles have no mean to exchange with")));
     } else if per_bin < FEW_PER_BIN {
         diagnostics.push(place(Diagnostic::warning(N101, "means over few particles are mostly noise")));
     }
@@ -168,7 +175,10 @@ fn exchange(scenario: &Scenario, plan: &Plan, limits: &mut Vec<Limit>, diagnosti
             .at(scenario.run.step_span, format!("chi dt = {value:.3}"))
             .found(format!("chi dt = {value:.3}"))
             .expected(format!("chi dt <= {LARGE_EXCHANGE}"))
-            .help(format!("use `step {}` or less, or write `rate instant` if the limit is meant", round_down(step)));
+            .help(format!(
+                "use `step {}` or less, or write `rate instant` if the limit is meant",
+                round_down(step)
+            ));
         if let Some(written) = written {
             message = message.also(written.rate_span, "the rate is set here");
         }
@@ -263,7 +273,8 @@ fn check_memory(
     diagnostics: &mut Vec<Diagnostic>,
 ) {
     let Some(available) = memory else { return };
-    let needed = cost.state_bytes.saturating_add(cost.bin_bytes).saturating_add(cost::particle_output_bytes(plan));
+    let needed =
+        cost.state_bytes.saturating_add(cost.bin_bytes).saturating_add(cost::particle_output_bytes(plan));
     if needed <= available {
         return;
     }

@@ -3,8 +3,8 @@
 use super::build_tape::build_tape;
 use super::evaluation::{self, Evaluation};
 use super::{
-    Axis, Component, InstantReaction, Mixing, NUMERICS_VERSION, Normals, Output, OutputKind, OutputUnit, Particles,
-    Placement, Plan, Quantity, Side, Species, Stage, Time, Walk, Zone, ZoneRate,
+    Axis, Component, InstantReaction, Mixing, NUMERICS_VERSION, Normals, Output, OutputKind, OutputUnit,
+    Particles, Placement, Plan, Quantity, Side, Species, Stage, Time, Walk, Zone, ZoneRate,
 };
 use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::D008;
@@ -21,7 +21,8 @@ pub fn lower(scenario: &Scenario) -> Result<(Plan, Evaluation), Vec<Diagnostic>>
     }
     let n_axes = scenario.domain.axes.len();
     let bins = scenario.bins.as_ref().map_or_else(|| vec![1; n_axes], |bins| bins.value.clone());
-    let axes: Vec<Axis> = scenario.domain.axes.iter().zip(bins).map(|(axis, bins)| lower_axis(axis, bins)).collect();
+    let axes: Vec<Axis> =
+        scenario.domain.axes.iter().zip(bins).map(|(axis, bins)| lower_axis(axis, bins)).collect();
     let volume: f64 = axes.iter().map(|axis| axis.high - axis.low).product();
     let plan = Plan {
         numerics: NUMERICS_VERSION,
@@ -35,7 +36,12 @@ pub fn lower(scenario: &Scenario) -> Result<(Plan, Evaluation), Vec<Diagnostic>>
             },
             volume: volume / scenario.particles.count as f64,
         },
-        species: scenario.species.iter().enumerate().map(|(idx, species)| lower_species(idx, species)).collect(),
+        species: scenario
+            .species
+            .iter()
+            .enumerate()
+            .map(|(idx, species)| lower_species(idx, species))
+            .collect(),
         components,
         mixing: scenario.mixing.as_ref().map(lower_mixing),
         reactions: scenario.reactions.iter().map(lower_reaction).collect(),
@@ -70,8 +76,10 @@ fn walk(scenario: &Scenario) -> Walk {
     let tensor = scenario.dispersion.as_ref().map_or([[0.0; 3]; 3], |tensor| tensor.value);
     let indices: Vec<usize> = scenario.domain.axes.iter().map(|axis| axis.index).collect();
     let drift = indices.iter().map(|&index| velocity[index] - scenario.domain.frame[index]).collect();
-    let doubled: Vec<Vec<f64>> =
-        indices.iter().map(|&row| indices.iter().map(|&column| 2.0 * tensor[row][column]).collect()).collect();
+    let doubled: Vec<Vec<f64>> = indices
+        .iter()
+        .map(|&row| indices.iter().map(|&column| 2.0 * tensor[row][column]).collect())
+        .collect();
     let normals = if scenario.run.are_normals_double { Normals::Double } else { Normals::Single };
     Walk { drift, spread: cholesky(&doubled), normals }
 }
@@ -154,7 +162,8 @@ fn time(scenario: &Scenario) -> Time {
     let (duration, step) = (scenario.run.duration, scenario.run.step);
     let exact = duration / step;
     // A duration that is a multiple up to rounding has no extra sliver of a step.
-    let n_steps = if (exact - exact.round()).abs() < 1e-9 * exact.max(1.0) { exact.round() } else { exact.ceil() };
+    let n_steps =
+        if (exact - exact.round()).abs() < 1e-9 * exact.max(1.0) { exact.round() } else { exact.ceil() };
     Time { step, n_steps: (n_steps as u64).max(1), duration }
 }
 

@@ -13,7 +13,10 @@ pub(super) fn run(draft: &mut Draft) {
         if draft.plan.axes.len() > 1 && is_idle(&draft.plan, axis_idx) {
             let name = ["x", "y", "z"][draft.plan.axes[axis_idx].index];
             remove(&mut draft.plan, axis_idx);
-            draft.leave_out(format!("axis `{name}`"), "no gradient, no flux through its sides, and no output along it");
+            draft.leave_out(
+                format!("axis `{name}`"),
+                "no gradient, no flux through its sides, and no output along it",
+            );
         } else {
             axis_idx += 1;
         }
@@ -59,7 +62,9 @@ fn remove(plan: &mut Plan, axis_idx: usize) {
     let is_diagonal = (0..n_axes).all(|row| (0..row).all(|column| at(row, column) == 0.0));
     plan.walk.spread = if is_diagonal {
         // The factors themselves, not their squares' roots: the same bits as a scene without the axis.
-        stay.iter().enumerate().flat_map(|(i, &row)| (0..=i).map(move |j| (i, j, row)))
+        stay.iter()
+            .enumerate()
+            .flat_map(|(i, &row)| (0..=i).map(move |j| (i, j, row)))
             .map(|(i, j, row)| if i == j { at(row, row) } else { 0.0 })
             .collect()
     } else {

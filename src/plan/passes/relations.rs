@@ -87,7 +87,8 @@ fn restore(draft: &mut Draft, relations: &[Option<Relation>], kept: &[usize]) {
                 }
             }
         }
-        species.terms = terms.into_iter().filter_map(|(component, factor)| Some((place(component)?, factor))).collect();
+        species.terms =
+            terms.into_iter().filter_map(|(component, factor)| Some((place(component)?, factor))).collect();
     }
     let mut idx = 0;
     draft.plan.components.retain(|_| {
@@ -109,7 +110,8 @@ fn express(form: &Affine, kept: &[usize], forms: &[Affine]) -> Option<Relation> 
     names.sort_unstable();
     names.dedup();
     let entry = |form: &Affine, row: usize| form.terms.get(names[row]).copied().unwrap_or(0.0);
-    let matrix = nalgebra::DMatrix::from_fn(names.len(), kept.len(), |row, column| entry(&forms[kept[column]], row));
+    let matrix =
+        nalgebra::DMatrix::from_fn(names.len(), kept.len(), |row, column| entry(&forms[kept[column]], row));
     let target = nalgebra::DVector::from_fn(names.len(), |row, _| entry(form, row));
     let scale = target.amax();
     let solved = matrix.clone().svd(true, true).solve(&target, 1e-13 * matrix.amax()).ok()?;
@@ -118,7 +120,10 @@ fn express(form: &Affine, kept: &[usize], forms: &[Affine]) -> Option<Relation> 
     if !(residual <= TOLERANCE * scale) {
         return None;
     }
-    let constant = kept.iter().zip(&factors).fold(form.constant, |sum, (idx, factor)| sum - factor * forms[*idx].constant);
+    let constant = kept
+        .iter()
+        .zip(&factors)
+        .fold(form.constant, |sum, (idx, factor)| sum - factor * forms[*idx].constant);
     let terms = kept.iter().copied().zip(factors).filter(|(_, factor)| *factor != 0.0).collect();
     constant.is_finite().then_some(Relation { constant, terms })
 }
@@ -178,7 +183,9 @@ impl Walker<'_> {
                 (_, Some(factor)) => Some(of(a).times(factor)),
                 _ => None,
             },
-            Operation::Binary(Binary::Divide, a, b) => of(b).as_constant().map(|divisor| of(a).times(1.0 / divisor)),
+            Operation::Binary(Binary::Divide, a, b) => {
+                of(b).as_constant().map(|divisor| of(a).times(1.0 / divisor))
+            }
             Operation::Select(condition, then, otherwise) => {
                 let difference = of(then).plus(of(otherwise), -1.0).as_constant()?;
                 let indicator = self.indicator(condition);

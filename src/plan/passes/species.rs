@@ -41,7 +41,8 @@ fn read_species(plan: &Plan) -> Vec<bool> {
     loop {
         let before = is_read.clone();
         for reaction in &plan.reactions {
-            let touches = reaction.reactants.iter().chain(&reaction.products).any(|(species, _)| is_read[*species]);
+            let touches =
+                reaction.reactants.iter().chain(&reaction.products).any(|(species, _)| is_read[*species]);
             if touches {
                 reaction.reactants.iter().for_each(|(species, _)| is_read[*species] = true);
             }
@@ -66,7 +67,9 @@ fn remove(draft: &mut Draft, is_read: &[bool]) {
     let plan = &mut draft.plan;
     retain_by(&mut plan.species, is_read);
     let is_carried: Vec<bool> = (0..plan.components.len())
-        .map(|component| plan.species.iter().any(|species| species.terms.iter().any(|(idx, _)| *idx == component)))
+        .map(|component| {
+            plan.species.iter().any(|species| species.terms.iter().any(|(idx, _)| *idx == component))
+        })
         .collect();
     retain_by(&mut plan.components, &is_carried);
     let new_component = |old: usize| is_carried[..old].iter().filter(|is_carried| **is_carried).count();

@@ -12,7 +12,10 @@ pub(super) fn run(draft: &mut Draft) {
     if plan.mixing.is_none() {
         notes.push(("mixing and averages in a step", "no mixing zones"));
     } else if !mixes {
-        notes.push(("mixing and averages in a step", "no zone with a finite rate: means are taken at outputs only"));
+        notes.push((
+            "mixing and averages in a step",
+            "no zone with a finite rate: means are taken at outputs only",
+        ));
     }
     if !moves {
         notes.push(("moving particles", "neither flow in the frame nor dispersion"));
@@ -23,7 +26,10 @@ pub(super) fn run(draft: &mut Draft) {
     if plan.reactions.is_empty() {
         notes.push(("reaction", "no reactions"));
     } else {
-        notes.push(("reaction in a step", "instant: particles carry conserved totals, products are worked out at outputs"));
+        notes.push((
+            "reaction in a step",
+            "instant: particles carry conserved totals, products are worked out at outputs",
+        ));
     }
     notes.push(("neighbour search", "no kernel interaction"));
     let mut stages = match (moves, mixes) {

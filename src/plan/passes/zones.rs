@@ -41,7 +41,10 @@ pub(super) fn merge_equal(draft: &mut Draft) {
         match merged.iter_mut().find(|known| known.rate == zone.rate) {
             Some(known) => {
                 known.fraction += zone.fraction;
-                notes.push((format!("zone `{}`", zone.name), format!("same rate as zone `{}`: one value serves both", known.name)));
+                notes.push((
+                    format!("zone `{}`", zone.name),
+                    format!("same rate as zone `{}`: one value serves both", known.name),
+                ));
             }
             None => merged.push(zone),
         }

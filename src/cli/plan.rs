@@ -1,0 +1,74 @@
+//! `lamella plan`: what would run, what it costs, what was left out and why.
+
+use super::files::display_name;
+use super::{CommandResult, Exit, Terminal, load};
+use clap::ValueEnum;
+use lamella::Checked;
+use lamella::diagnostic::any_fatal;
+use lamella::plan::document::{self, EmbeddedSource};
+use lamella::plan::explain::explain;
+use lamella::scenario::Settings;
+use lamella::source::FileId;
+use lamella::syntax;
+use std::path::PathBuf;
+
+/// Show what would run, what it costs, and what was left out and why
+#[derive(clap::Args)]
+pub(crate) struct Arguments {
+    /// Scene file; `-` is standard input
+    file: PathBuf,
+    /// Print a station on the way from text to run instead
+    #[arg(long, value_enum)]
+    emit: Option<Emit>,
+    /// Set a parameter, such as v=2cm/s
+    #[arg(long, value_name = "NAME=VALUE", value_parser = load::parse_setting)]
+    set: Vec<(String, String)>,
+    /// Root of all random numbers, instead of the scene's
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Leave nothing out
+    #[arg(long)]
+    no_passes: bool,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum Emit {
+    /// The text as a tree
+    Tree,
+    /// Names resolved, everything in SI
+    Scenario,
+    /// What the engine is given
+    Plan,
+    /// The plan as results keep it, with its hash
+    Yaml,
+}
+
+pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
+    let settings = Settings { set: arguments.set.clone(), seed: arguments.seed };
+    let checked = load::load(&arguments.file, &settings, arguments.no_passes)?;
+    terminal.diagnostics(&checked.diagnostics, &checked.sources);
+    if let Some(text) = product(arguments, &checked) {
+        terminal.product(&text)?;
+    }
+    Ok(if any_fatal(&checked.diagnostics) { Exit::SceneWrong } else { Exit::Done })
+}
+
+/// What was asked for, if the scene came that far.
+fn product(arguments: &Arguments, checked: &Checked) -> Option<String> {
+    let compiled = checked.compiled.as_ref();
+    let scenario = checked.scenario.as_ref();
+    match arguments.emit {
+        Some(Emit::Tree) => Some(format!("{:#?}\n", checked.file)),
+        Some(Emit::Scenario) => scenario.map(|scenario| format!("{scenario:#?}\n")),
+        Some(Emit::Plan) => compiled.map(|compiled| format!("{:#?}\n", compiled.plan)),
+        Some(Emit::Yaml) => {
+            let source = checked.sources.file(FileId(0));
+            let text = syntax::format(&checked.file, &source.text);
+            compiled.map(|compiled| document::write(compiled, &[EmbeddedSource::new(&source.name, text)]))
+        }
+        None => compiled.map(|compiled| {
+            let title = scenario.and_then(|scenario| scenario.title.as_deref());
+            explain(compiled, &display_name(&arguments.file), title)
+        }),
+    }
+}
