@@ -106,7 +106,7 @@ pub(super) fn output_of(
     hint: Option<usize>,
 ) -> Result<Option<usize>, String> {
     Ok(match field {
-        Field::Number(_) => None,
+        Field::Number(_) | Field::Position(_) => None,
         Field::Output(kind, quantity) => {
             Some(run.find(*kind, *quantity).ok_or("no output of the run has that species or pair.")?)
         }
@@ -128,7 +128,7 @@ pub(super) fn output_of(
 /// The first output that a field names.
 pub(super) fn first_output(run: &Run, field: &Field) -> Option<usize> {
     match field {
-        Field::Number(_) | Field::Reference(_) => None,
+        Field::Number(_) | Field::Position(_) | Field::Reference(_) => None,
         Field::Output(kind, quantity) => run.find(*kind, *quantity),
         Field::Unary(_, a) => first_output(run, a),
         Field::Binary(_, a, b) => first_output(run, a).or_else(|| first_output(run, b)),
@@ -159,6 +159,10 @@ pub(super) fn values(
 fn fill(run: &Run, references: &[Prepared], field: &Field, target: &mut Values) -> Result<(), String> {
     match field {
         Field::Number(number) => target.times.iter_mut().for_each(|time| time.values.fill(*number)),
+        Field::Position(index) => {
+            let centres = target.grid.centres(*index).ok_or("the run has no such axis.")?;
+            target.times.iter_mut().for_each(|time| time.values.copy_from_slice(&centres));
+        }
         Field::Output(kind, quantity) => {
             let output_idx =
                 run.find(*kind, *quantity).ok_or("no output of the run has that species or pair.")?;

@@ -54,6 +54,14 @@ impl Grid {
         bin / inner % self.axes[axis_idx].n_bins
     }
 
+    /// Centre of every bin along axis `index` (0, 1, 2 for x, y, z); `None` without that axis.
+    pub(super) fn centres(&self, index: usize) -> Option<Vec<f64>> {
+        let axis_idx = self.axes.iter().position(|axis| axis.index == index)?;
+        let axis = &self.axes[axis_idx];
+        let centre = |bin| axis.low + (self.bin_along(bin, axis_idx) as f64 + 0.5) * axis.width;
+        Some((0..self.n_bins()).map(centre).collect())
+    }
+
     /// The axis of a profile: the first one that is cut into bins.
     pub(super) fn profile_axis(&self) -> Option<usize> {
         self.axes.iter().position(|axis| axis.n_bins > 1).or(if self.axes.is_empty() {

@@ -97,6 +97,8 @@ pub enum Norm {
 #[serde(rename_all = "snake_case")]
 pub enum Field {
     Number(f64),
+    /// Centre of the bin along axis 0, 1, 2 for x, y, z; m.
+    Position(usize),
     Output(OutputKind, Quantity),
     /// Index into `Evaluation::references`.
     Reference(usize),

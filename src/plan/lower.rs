@@ -270,6 +270,7 @@ fn lower_field(field: &scenario::Field) -> evaluation::Field {
     use scenario::Field as From;
     match field {
         From::Number(value) => To::Number(*value),
+        From::Position(index) => To::Position(*index),
         From::Output(kind, target) => {
             let quantity = match *target {
                 scenario::FieldTarget::Species(a) => Quantity::Species(a),

@@ -8,7 +8,7 @@ use super::observe::{OUTPUTS, time_list};
 use super::scope::Origin;
 use super::{Measure, Output, OutputKind, Reference, Target};
 use crate::diagnostic::Diagnostic;
-use crate::diagnostic::codes::{D007, M015, U101, U108};
+use crate::diagnostic::codes::{D007, M015, U101, U103, U108};
 use crate::maths::operator::{Binary, Unary};
 use crate::source::Span;
 use crate::syntax::tree::{self, BinaryOperator, ExprKind, UnaryOperator};
@@ -51,6 +51,8 @@ pub enum Norm {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Field {
     Number(f64),
+    /// Centre of the bin along axis 0, 1, 2 for x, y, z.
+    Position(usize),
     Output(OutputKind, FieldTarget),
     Reference(usize),
     Unary(Unary, Box<Field>),
@@ -85,8 +87,8 @@ const NORMS: &[(&str, Norm)] = &[
 /// A checked part of a measure.
 enum Part {
     Scalar(Scalar, Type),
-    /// A field and the kind of output on whose bins it lives.
-    Field(Field, Type, OutputKind),
+    /// A field and the kind of output on whose bins it lives; `None` fits any bins.
+    Field(Field, Type, Option<OutputKind>),
 }
 
 impl Part {
@@ -208,6 +210,9 @@ fn path_part<'a>(
         {
             return Some(Part::Scalar(Scalar::Fact(*fact), Type::Number(*dimension)));
         }
+        if let Some(&(_, index)) = checker.axes.iter().find(|(axis, _)| *axis == name.value) {
+            return Some(Part::Field(Field::Position(index), Type::Number(Dimension::LENGTH), None));
+        }
         if let Some(Origin::Reference(idx)) = checker.scope.get(&name.value).map(|entry| entry.origin) {
             return reference_part(checker, results, idx);
         }
@@ -253,7 +258,7 @@ fn path_part<'a>(
         OutputKind::Mixing => Dimension::NONE,
         kind => kind.dimension(concentration, checker.axes.len()),
     };
-    Some(Part::Field(Field::Output(kind, target), Type::Number(dimension), kind))
+    Some(Part::Field(Field::Output(kind, target), Type::Number(dimension), Some(kind)))
 }
 
 fn reference_part(checker: &mut Checker<'_>, results: &Results<'_>, idx: usize) -> Option<Part> {
@@ -275,7 +280,7 @@ fn reference_part(checker: &mut Checker<'_>, results: &Results<'_>, idx: usize) 
         OutputKind::Mixing => Dimension::NONE,
         kind => kind.dimension(concentration, checker.axes.len()),
     };
-    Some(Part::Field(Field::Reference(idx), Type::Number(dimension), kind))
+    Some(Part::Field(Field::Reference(idx), Type::Number(dimension), Some(kind)))
 }
 
 fn apply_unary(operator: Unary, part: Part) -> Part {
@@ -317,16 +322,52 @@ fn call_part<'a>(
         );
         return None;
     };
+    if on.is_none() {
+        checker.report(
+            Diagnostic::error(U108, format!("`{name}` needs an output"))
+                .at(argument.value.span, "on which bins?")
+                .found("positions only")
+                .expected("an expression with an output such as `profile.A`"),
+        );
+        return None;
+    }
     let dimension = norm_dimension(norm, kind.dimension()?, on, checker.axes.len());
     Some(Part::Scalar(Scalar::Norm(norm, Box::new(field)), Type::Number(dimension)))
 }
 
+/// A part to a constant power.
+fn power_part(base: Part, exponent: Part, checker: &mut Checker<'_>, expr: &tree::Expr) -> Option<Part> {
+    let power = match exponent {
+        Part::Scalar(Scalar::Number(power), Type::Number(Dimension::NONE) | Type::Zero) => Some(power),
+        _ => None,
+    };
+    let dimension = power.and_then(|power| base.kind().dimension()?.power_f64(power));
+    let (Some(power), Some(dimension)) = (power, dimension) else {
+        checker.report(
+            Diagnostic::error(U103, "the dimension of this power is not fixed")
+                .at(expr.span, "the exponent must be a constant with a simple fraction")
+                .found("another exponent")
+                .expected("a constant such as 2 or 0.5"),
+        );
+        return None;
+    };
+    let kind = Type::Number(dimension);
+    Some(match base {
+        Part::Scalar(a, _) => {
+            Part::Scalar(Scalar::Binary(Binary::Power, Box::new(a), Box::new(Scalar::Number(power))), kind)
+        }
+        Part::Field(a, _, on) => {
+            Part::Field(Field::Binary(Binary::Power, Box::new(a), Box::new(Field::Number(power))), kind, on)
+        }
+    })
+}
+
 /// Norms that integrate over space carry the volume of the bins.
-fn norm_dimension(norm: Norm, field: Dimension, on: OutputKind, n_axes: usize) -> Dimension {
+fn norm_dimension(norm: Norm, field: Dimension, on: Option<OutputKind>, n_axes: usize) -> Dimension {
     let n_integrated = match on {
-        OutputKind::Profile | OutputKind::Covariance => 1,
-        OutputKind::Map => n_axes as i32,
-        OutputKind::Total | OutputKind::Mixing | OutputKind::Particles => 0,
+        Some(OutputKind::Profile | OutputKind::Covariance) => 1,
+        Some(OutputKind::Map) => n_axes as i32,
+        Some(OutputKind::Total | OutputKind::Mixing | OutputKind::Particles) | None => 0,
     };
     let power = match norm {
         Norm::L1 | Norm::Integral => (n_integrated, 1),
@@ -348,6 +389,7 @@ fn binary_part(
         BinaryOperator::Subtract => (Binary::Subtract, true),
         BinaryOperator::Multiply => (Binary::Multiply, false),
         BinaryOperator::Divide => (Binary::Divide, false),
+        BinaryOperator::Power => return power_part(left, right, checker, expr),
         _ => {
             checker.report(
                 Diagnostic::error(U108, "a measure is made of sums, products and norms")
@@ -377,8 +419,8 @@ fn binary_part(
         (Part::Scalar(a, _), Part::Scalar(b, _)) => {
             Some(Part::Scalar(Scalar::Binary(op, Box::new(a), Box::new(b)), kind))
         }
-        (Part::Field(a, _, on), Part::Field(b, _, other)) if on == other => {
-            Some(Part::Field(Field::Binary(op, Box::new(a), Box::new(b)), kind, on))
+        (Part::Field(a, _, on), Part::Field(b, _, other)) if on == other || on.is_none() || other.is_none() => {
+            Some(Part::Field(Field::Binary(op, Box::new(a), Box::new(b)), kind, on.or(other)))
         }
         (Part::Field(a, _, on), Part::Scalar(Scalar::Number(b), _)) => {
             Some(Part::Field(Field::Binary(op, Box::new(a), Box::new(Field::Number(b))), kind, on))
