@@ -143,7 +143,7 @@ pub fn did_you_mean<'a>(name: &str, candidates: impl IntoIterator<Item = &'a str
             let allowed = (n_chars.max(candidate.chars().count()) / 3).max(1);
             let distance = strsim::damerau_levenshtein(name, candidate);
             // A whole different one-letter name is not a misspelling of another one.
-            let is_close = distance <= allowed && distance < n_chars.max(2);
+            let is_close = distance <= allowed && distance < n_chars;
             is_close.then_some((distance, candidate))
         })
         .min_by_key(|(distance, _)| *distance)

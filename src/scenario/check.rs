@@ -87,8 +87,10 @@ impl<'a> Checker<'a> {
         if expr.size > MAX_EXPRESSION_SIZE {
             self.report(
                 Diagnostic::error(D008, "this expression is too large once its functions are put in")
-                    .at(expr.span, format!("more than {MAX_EXPRESSION_SIZE} operations"))
-                    .help("call functions with names (`let`) instead of nested calls"),
+                    .at(expr.span, "grown too large here")
+                    .found(format!("{} operations", expr.size))
+                    .expected(format!("at most {MAX_EXPRESSION_SIZE} operations"))
+                    .help("each use of a function's parameter repeats its whole argument: use it less often"),
             );
             return None;
         }
@@ -251,7 +253,16 @@ impl<'a> Checker<'a> {
 
     fn named(&mut self, text: &str, span: Span, allow: Allow) -> Option<Expr> {
         let Some(entry) = self.scope.get_mut(text) else {
-            self.scope.note_undefined(text, span);
+            if BUILT_IN_FUNCTIONS.contains(&text) {
+                self.report(
+                    Diagnostic::error(D005, format!("`{text}` cannot be used here"))
+                        .at(span, "a built-in function without its arguments")
+                        .found("a function")
+                        .expected("numbers, constants and parameters"),
+                );
+            } else {
+                self.scope.note_undefined(text, span);
+            }
             return None;
         };
         entry.n_uses += 1;

@@ -1,10 +1,10 @@
 //! The phase itself: statements gathered, names defined, every part resolved in its turn.
 
-use super::check::Checker;
+use super::check::{Allow, Checker};
 use super::expression::Type;
 use super::scope::{Origin, Progress, Scope};
 use super::{Parameter, Scenario, Settings};
-use crate::diagnostic::codes::{D001, D010, M001, M002, P001, P002};
+use crate::diagnostic::codes::{D001, D010, M001, M002, P001, P002, U104};
 use crate::diagnostic::{Diagnostic, did_you_mean};
 use crate::source::{Sources, Span};
 use crate::syntax::tree::{self, StatementKind};
@@ -277,6 +277,7 @@ fn parameters<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> Vec
     for statement in &statements.params {
         let name = &statement.name.value;
         let value = checker.constant_of(name);
+        check_setting(checker, statement, value.map(|(_, kind)| kind));
         let dimension = value.and_then(|(_, kind)| match kind {
             Type::Number(dimension) => Some(dimension),
             _ => None,
@@ -310,6 +311,28 @@ fn parameters<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> Vec
         });
     }
     list
+}
+
+/// A setting of the command line keeps the dimension that the scene gives its parameter.
+fn check_setting<'a>(checker: &mut Checker<'a>, written: &'a tree::Param, kind: Option<Type>) {
+    let set = match checker.scope.get(&written.name.value).map(|entry| entry.origin) {
+        Some(Origin::Param(set)) if !std::ptr::eq(set, written) => set,
+        _ => return,
+    };
+    let own = checker.check(&written.value, Allow::CONSTANT);
+    let (Some(own), Some(kind)) = (own, kind) else { return };
+    if own.kind.unify(kind).is_none() {
+        checker.report(
+            Diagnostic::error(
+                U104,
+                format!("`{}` is set to a value of another dimension", written.name.value),
+            )
+            .at(set.value.span, format!("this is {}", kind.describe()))
+            .also(written.value.span, format!("this is {}", own.kind.describe()))
+            .found(kind.describe())
+            .expected(own.kind.describe()),
+        );
+    }
 }
 
 fn report_unused(scope: &Scope<'_>, diagnostics: &mut Vec<Diagnostic>) {
@@ -346,7 +369,7 @@ fn read_overrides(
         let id = sources.add(format!("--set {name}={value}"), text.clone());
         let place = Span::new(id, "lamella 1\nlet ".len(), text.len() - 1);
         let Some(param) = params.iter().find(|param| param.name.value == *name) else {
-            diagnostics.push(unknown_parameter(name, place, &params));
+            diagnostics.push(unknown_parameter(name, place, &params, constant(file, name)));
             continue;
         };
         let (parsed, errors) = crate::syntax::parse(id, &text);
@@ -362,7 +385,20 @@ fn read_overrides(
     overrides
 }
 
-fn unknown_parameter(name: &str, place: Span, params: &[&tree::Param]) -> Diagnostic {
+/// The `let` statement of that name.
+fn constant<'a>(file: &'a tree::File, name: &str) -> Option<&'a tree::Let> {
+    file.statements.iter().find_map(|statement| match &statement.kind {
+        StatementKind::Let(constant) if constant.name.value == name => Some(constant),
+        _ => None,
+    })
+}
+
+fn unknown_parameter(
+    name: &str,
+    place: Span,
+    params: &[&tree::Param],
+    constant: Option<&tree::Let>,
+) -> Diagnostic {
     let names: Vec<&str> = params.iter().map(|param| param.name.value.as_str()).collect();
     let mut message = Diagnostic::error(P001, format!("the scene has no parameter `{name}`"))
         .at(place, "set on the command line")
@@ -370,9 +406,13 @@ fn unknown_parameter(name: &str, place: Span, params: &[&tree::Param]) -> Diagno
         .expected(if names.is_empty() {
             "no setting: the scene has no `param`".into()
         } else {
-            names.join(", ")
+            names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
         });
-    if let Some(candidate) = did_you_mean(name, names.iter().copied()) {
+    if let Some(constant) = constant {
+        message = message
+            .also(constant.name.span, "a constant, which is fixed")
+            .help("write it as `param` instead of `let`, and it can be set");
+    } else if let Some(candidate) = did_you_mean(name, names.iter().copied()) {
         message = message.help(format!("did you mean `{candidate}`?"));
     }
     message

@@ -42,12 +42,16 @@ pub(super) fn domain<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>)
         .collect();
     let is_right_number = n_axes.is_none_or(|n| n == statement.axes.len());
     if !is_right_number {
-        let n = n_axes.unwrap_or(0);
+        let expected = match n_axes {
+            Some(1) => "one axis".to_owned(),
+            n => format!("{} axes", n.unwrap_or(0)),
+        };
+        let n_given = statement.axes.len();
         checker.report(
-            Diagnostic::error(M006, format!("a {} has {n} axes", statement.shape.value))
+            Diagnostic::error(M006, format!("a {} has {expected}", statement.shape.value))
                 .at(statement.shape.span.to(statement.axes.last().map_or(span, |axis| axis.name.span)), "")
-                .found(format!("{} axes", statement.axes.len()))
-                .expected(format!("{n} axes"))
+                .found(if n_given == 1 { "one axis".to_owned() } else { format!("{n_given} axes") })
+                .expected(expected)
                 .help("`line` has one axis, `rect` two, `box` three"),
         );
     }
@@ -57,8 +61,9 @@ pub(super) fn domain<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>)
     };
     let mut axes: Vec<Axis> = axes.into_iter().collect::<Option<_>>()?;
     axes.sort_by_key(|axis| axis.index);
-    let sides = set_sides(checker, statements, &mut axes, statement);
-    (n_axes.is_some() && is_right_number && sides).then_some(())?;
+    // The names of the sides follow from the axes: with a wrong number of these nothing is said of them.
+    let sides = is_right_number && set_sides(checker, statements, &mut axes, statement);
+    (n_axes.is_some() && sides).then_some(())?;
     Some(Domain { span, axes, frame: frame? })
 }
 
@@ -139,7 +144,7 @@ fn set_sides<'a>(
                         .at(side.span, "here again")
                         .also(first, "first here")
                         .found("two boundaries for one side")
-                        .expected("one"),
+                        .expected("one boundary for every side"),
                 );
                 is_right = false;
             }
@@ -278,18 +283,19 @@ fn check_tensor(checker: &mut Checker<'_>, written: &tree::Expr, tensor: &[[f64;
     let largest = matrix.amax();
     let is_symmetric = (matrix - matrix.transpose()).amax() <= 1e-12 * largest;
     let smallest = if is_symmetric { matrix.symmetric_eigenvalues().min() } else { 0.0 };
-    let problem = if !is_symmetric {
-        "it is not symmetric".to_owned()
+    let (label, found) = if !is_symmetric {
+        ("it is not symmetric".to_owned(), "a tensor that is not symmetric".to_owned())
     } else if smallest < -1e-12 * largest {
-        format!("it has the negative eigenvalue {smallest:e} m^2/s")
+        let found = format!("the negative eigenvalue {smallest:e} m^2/s");
+        (format!("it has {found}"), found)
     } else {
         return Some(());
     };
     checker.report(
         Diagnostic::error(M008, "this is no dispersion tensor")
-            .at(written.span, problem.clone())
-            .found(problem)
-            .expected("a symmetric tensor without negative eigenvalues"),
+            .at(written.span, label)
+            .found(found)
+            .expected("a symmetric tensor without negative eigenvalues; one value is not negative"),
     );
     None
 }
@@ -323,8 +329,16 @@ pub(super) fn grid(
         checker.report(
             Diagnostic::error(D009, format!("{what} must be given for each axis of the domain"))
                 .at(place, format!("{} here", values.len()))
-                .found(format!("{} counts", values.len()))
-                .expected(format!("{n_axes}, joined by `x`")),
+                .found(if values.len() == 1 {
+                    "1 count".to_owned()
+                } else {
+                    format!("{} counts", values.len())
+                })
+                .expected(if n_axes == 1 {
+                    "one count".to_owned()
+                } else {
+                    format!("{n_axes} counts, joined by `x`")
+                }),
         );
         return None;
     }

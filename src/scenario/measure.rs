@@ -239,11 +239,13 @@ fn path_part<'a>(
     };
     let Some(output) = results.outputs.iter().find(has) else {
         if results.are_whole {
+            let words: Vec<&str> = path.iter().map(|name| name.value.as_str()).collect();
             checker.report(
                 Diagnostic::error(M015, "no output of the scene gives this")
                     .at(expr.span, "not an output")
-                    .found(path.iter().map(|name| name.value.as_str()).collect::<Vec<_>>().join("."))
-                    .expected("KIND.SPECIES of an `output` statement, such as `profile.A`"),
+                    .found(format!("`{}`", words.join(".")))
+                    .expected("KIND.SPECIES of an `output` statement, such as `profile.A`")
+                    .help(format!("add an `output {} {}` statement", kind.word(), words[1..].join(", "))),
             );
         }
         return None;
@@ -419,7 +421,9 @@ fn binary_part(
         (Part::Scalar(a, _), Part::Scalar(b, _)) => {
             Some(Part::Scalar(Scalar::Binary(op, Box::new(a), Box::new(b)), kind))
         }
-        (Part::Field(a, _, on), Part::Field(b, _, other)) if on == other || on.is_none() || other.is_none() => {
+        (Part::Field(a, _, on), Part::Field(b, _, other))
+            if on == other || on.is_none() || other.is_none() =>
+        {
             Some(Part::Field(Field::Binary(op, Box::new(a), Box::new(b)), kind, on.or(other)))
         }
         (Part::Field(a, _, on), Part::Scalar(Scalar::Number(b), _)) => {

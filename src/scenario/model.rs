@@ -7,7 +7,7 @@ use super::scope::Origin;
 use super::slot::collect_names;
 use super::{Mixing, Particles, Placement, Reaction, Run, Species, Zone};
 use crate::diagnostic::Diagnostic;
-use crate::diagnostic::codes::{D002, D005, D006, M001, M002, M005, M009, M010, M011, M012, M013};
+use crate::diagnostic::codes::{D002, D005, D006, M001, M002, M004, M005, M009, M010, M011, M012, M013};
 use crate::source::Span;
 use crate::syntax::tree::{self, ExprKind};
 use crate::units::Dimension;
@@ -31,8 +31,17 @@ const CONCENTRATIONS: [Dimension; 2] = [Dimension::MOLAR_CONCENTRATION, Dimensio
 pub(super) fn species<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> SpeciesList {
     for species in &statements.species {
         for qualifier in &species.qualifiers {
-            // All species move with the fluid in this edition; the word may say so.
-            checker.word(qualifier, "a property of a species", &[("mobile", ())]);
+            // All species move with the fluid in this version; the word may say so.
+            if qualifier.value == "immobile" {
+                checker.report(
+                    Diagnostic::error(M004, "immobile species are not in this version")
+                        .at(qualifier.span, "all species move with the fluid")
+                        .found("`immobile`")
+                        .expected("`mobile`, or nothing"),
+                );
+            } else {
+                checker.word(qualifier, "a property of a species", &[("mobile", ())]);
+            }
         }
     }
     let assigned = assignments(checker, statements);
@@ -256,15 +265,20 @@ fn check_instant(checker: &mut Checker<'_>, written: &tree::Reaction) -> Option<
     let is_instant =
         matches!(&written.rate.kind, ExprKind::Path(path) if path.len() == 1 && path[0].value == "instant");
     if !is_instant {
-        let found = match &written.rate.kind {
-            ExprKind::Path(path) => path.iter().map(|name| name.value.as_str()).collect::<Vec<_>>().join("."),
-            _ => "a rate law".to_owned(),
-        };
+        let mut names = Vec::new();
+        collect_names(&written.rate, &mut names);
+        // What the law names is used, so that nothing is said of it besides.
+        for name in &names {
+            if let Some(entry) = checker.scope.get_mut(name) {
+                entry.n_uses += 1;
+            }
+        }
+        let word = matches!(&written.rate.kind, ExprKind::Path(_)).then(|| names.first()).flatten();
         let mut message = Diagnostic::error(M011, "this rate is not in this version")
             .at(written.rate.span, "only `instant` is known here")
-            .found(format!("`{found}`"))
+            .found(word.map_or_else(|| "a rate law".to_owned(), |word| format!("`{word}`")))
             .expected("`instant`");
-        if crate::diagnostic::did_you_mean(&found, ["instant"]).is_some() {
+        if word.is_some_and(|word| crate::diagnostic::did_you_mean(word, ["instant"]).is_some()) {
             message = message.help("did you mean `instant`?");
         }
         checker.report(message);
@@ -335,11 +349,14 @@ fn check_competition(checker: &mut Checker<'_>, statements: &Statements<'_>, all
             let mut message = Diagnostic::error(M012, "instant reactions compete")
                 .at(second.span, format!("`{name}` has more than one part in instant reactions"))
                 .found(format!("`{name}` twice"))
-                .expected("each reactant of an instant reaction in that place alone")
-                .note("two instant reactions of one species have no order, so their result is not defined");
-            if !is_same {
-                message = message.also(first.span, "and here");
-            }
+                .expected("each reactant of an instant reaction in that place alone");
+            message = if is_same {
+                message.help(format!("write `{name}` on one side only"))
+            } else {
+                message.also(first.span, "and here").note(
+                    "two instant reactions of one species have no order, so their result is not defined",
+                )
+            };
             checker.report(message);
             return None;
         }
@@ -417,8 +434,8 @@ fn read_zone<'a>(checker: &mut Checker<'a>, zone: &'a tree::Zone) -> Option<Zone
                 )
                 .at(field.name.span, "here again")
                 .also(first.name.span, "first here")
-                .found("two")
-                .expected("one"),
+                .found(format!("`{}` twice", field.name.value))
+                .expected(format!("one `{}`", field.name.value)),
             );
             is_right = false;
         }

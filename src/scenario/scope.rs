@@ -85,11 +85,15 @@ impl<'a> Scope<'a> {
             );
             return;
         }
-        if let Some(first) = self.entries.get(text) {
+        if let Some(known) = self.entries.get(text) {
+            // Kinds of statements are gathered one after another: the text decides which came first.
+            let mut places = [(known.span, known.origin), (name.span, origin)];
+            places.sort_by_key(|(span, _)| span.start);
+            let [first, second] = places;
             diagnostics.push(
                 Diagnostic::error(D002, format!("`{text}` is defined twice"))
-                    .at(name.span, format!("here again, as {}", origin.describe()))
-                    .also(first.span, format!("first defined here, as {}", first.origin.describe()))
+                    .at(second.0, format!("here again, as {}", second.1.describe()))
+                    .also(first.0, format!("first defined here, as {}", first.1.describe()))
                     .found("a second definition")
                     .expected("one definition of each name")
                     .help("rename one of the two, or delete it"),
@@ -124,8 +128,10 @@ impl<'a> Scope<'a> {
                 .at(*span, "no such name")
                 .found(format!("`{name}`"))
                 .expected("a name that the scene defines");
-            if *n_uses > 1 {
-                message = message.note(format!("it is used in {} more places", n_uses - 1));
+            match n_uses - 1 {
+                0 => {}
+                1 => message = message.note("it is used in one more place"),
+                n => message = message.note(format!("it is used in {n} more places")),
             }
             let names = self.entries.keys().map(String::as_str);
             let candidates =

@@ -75,6 +75,8 @@ impl<'a> Checker<'a> {
                 _ => return None,
             };
             match entry.progress {
+                // A setting of the command line has a text of its own: that is the place to look at.
+                Progress::Known(_, kind) if value.file != entry.span.file => Some((name, value, kind)),
                 Progress::Known(_, kind) => Some((name, entry.span.to_if_same_file(value), kind)),
                 _ => None,
             }
