@@ -10,6 +10,8 @@ pub const BLACK: Rgb = Rgb(0, 0, 0);
 pub const WHITE: Rgb = Rgb(255, 255, 255);
 /// Axes and small text.
 pub const INK: Rgb = Rgb(40, 40, 40);
+/// Dots that stand for the run in any colour.
+pub const FAINT: Rgb = Rgb(110, 110, 110);
 pub const GRID: Rgb = Rgb(228, 228, 228);
 /// Bins without particles on a map.
 pub const EMPTY: Rgb = Rgb(205, 205, 205);

@@ -82,29 +82,47 @@ pub fn draw(canvas: &mut Canvas, panel: &Panel, outer: Frame) {
     };
     let title = Lettering { size: 13.0, ..lettering(13.0, HPos::Left, VPos::Bottom) };
     canvas.letters(&panel.title, (inner.left, inner.top - 4.0), title);
-    grid(canvas, panel, inner);
+    let ticks = Ticks { x: x_ticks(panel, inner), y: panel.y.ticks(5) };
+    grid(canvas, panel, &ticks, inner);
     if let Some(heat) = &panel.heat {
         heat.draw(canvas, inner);
     }
     for mark in &panel.marks {
         draw_mark(canvas, panel, mark, inner);
     }
-    axes(canvas, panel, inner);
+    axes(canvas, panel, &ticks, inner);
     labels(canvas, panel, inner, outer);
     key(canvas, panel, inner);
 }
 
+/// Places and texts along both axes.
+struct Ticks {
+    x: Vec<(f64, String)>,
+    y: Vec<(f64, String)>,
+}
+
+/// As many as stand beside each other with a gap.
+fn x_ticks(panel: &Panel, frame: Frame) -> Vec<(f64, String)> {
+    let room = |ticks: &[(f64, String)]| -> f64 {
+        let named = ticks.iter().filter(|(_, text)| !text.is_empty());
+        named.map(|(_, text)| text_width(text, SMALL) + 14.0).sum()
+    };
+    let fits = |ticks: &Vec<(f64, String)>| room(ticks) <= frame.right - frame.left;
+    let mut choices = (2..=6).rev().map(|wanted| panel.x.ticks(wanted));
+    choices.find(fits).unwrap_or_else(|| panel.x.ticks(1))
+}
+
 /// Lines behind the marks at the named ticks.
-fn grid(canvas: &mut Canvas, panel: &Panel, frame: Frame) {
+fn grid(canvas: &mut Canvas, panel: &Panel, ticks: &Ticks, frame: Frame) {
     if panel.heat.is_some() {
         return;
     }
     let pen = Pen::new(GRID, 0.6);
-    for (value, _) in panel.x.ticks(6).iter().filter(|(_, text)| !text.is_empty()) {
+    for (value, _) in ticks.x.iter().filter(|(_, text)| !text.is_empty()) {
         let (x, _) = frame.place(&panel.x, &panel.y, (*value, panel.y.low));
         canvas.line(&[(x, frame.top), (x, frame.bottom)], pen);
     }
-    for (value, _) in panel.y.ticks(5).iter().filter(|(_, text)| !text.is_empty()) {
+    for (value, _) in ticks.y.iter().filter(|(_, text)| !text.is_empty()) {
         let (_, y) = frame.place(&panel.x, &panel.y, (panel.x.low, *value));
         canvas.line(&[(frame.left, y), (frame.right, y)], pen);
     }
@@ -115,8 +133,10 @@ fn draw_mark(canvas: &mut Canvas, panel: &Panel, mark: &Mark, frame: Frame) {
     let is_drawable = |point: &(f64, f64)| point.0.is_finite() && point.1.is_finite();
     match mark.look {
         Look::Dots => {
-            let radius = if mark.points.len() > 120 { 1.5 } else { 2.2 };
-            let pen = Pen { opacity: 0.5, ..Pen::new(mark.color, 0.0) };
+            // Many dots shine through, so that their density shows; few are larger and full.
+            let is_dense = mark.points.len() > 80;
+            let (radius, opacity) = if is_dense { (1.5, 0.5) } else { (2.4, 1.0) };
+            let pen = Pen { opacity, ..Pen::new(mark.color, 0.0) };
             for point in mark.points.iter().map(place).filter(is_drawable) {
                 canvas.dot(point, radius, pen);
             }
@@ -131,21 +151,21 @@ fn draw_mark(canvas: &mut Canvas, panel: &Panel, mark: &Mark, frame: Frame) {
     }
 }
 
-fn axes(canvas: &mut Canvas, panel: &Panel, frame: Frame) {
+fn axes(canvas: &mut Canvas, panel: &Panel, ticks: &Ticks, frame: Frame) {
     let pen = Pen::new(INK, 0.9);
     let Frame { left, top, right, bottom } = frame;
     canvas.line(&[(left, top), (right, top), (right, bottom), (left, bottom), (left, top)], pen);
-    for (value, text) in panel.x.ticks(6) {
-        let (x, _) = frame.place(&panel.x, &panel.y, (value, panel.y.low));
+    for (value, text) in &ticks.x {
+        let (x, _) = frame.place(&panel.x, &panel.y, (*value, panel.y.low));
         let length = if text.is_empty() { 2.5 } else { 4.0 };
         canvas.line(&[(x, bottom), (x, bottom + length)], pen);
-        canvas.letters(&text, (x, bottom + 6.0), lettering(SMALL, HPos::Center, VPos::Top));
+        canvas.letters(text, (x, bottom + 6.0), lettering(SMALL, HPos::Center, VPos::Top));
     }
-    for (value, text) in panel.y.ticks(5) {
-        let (_, y) = frame.place(&panel.x, &panel.y, (panel.x.low, value));
+    for (value, text) in &ticks.y {
+        let (_, y) = frame.place(&panel.x, &panel.y, (panel.x.low, *value));
         let length = if text.is_empty() { 2.5 } else { 4.0 };
         canvas.line(&[(left - length, y), (left, y)], pen);
-        canvas.letters(&text, (left - 6.0, y), lettering(SMALL, HPos::Right, VPos::Center));
+        canvas.letters(text, (left - 6.0, y), lettering(SMALL, HPos::Right, VPos::Center));
     }
 }
 

@@ -3,7 +3,7 @@
 //! Owns the choice of times, units and scales. May use `plan`, `engine::snapshot`, `table` and
 //! `measure`. It deliberately draws nothing.
 
-use super::color::{BLACK, INK, Rgb, SERIES, blend};
+use super::color::{BLACK, FAINT, Rgb, SERIES, blend};
 use super::display::{self, Shown, plain};
 use super::heat::Heat;
 use super::panel::{KeyEntry, Look, Mark, Panel};
@@ -11,7 +11,8 @@ use super::scale::{Scale, Spacing};
 use crate::engine::snapshot::{Snapshot, Values};
 use crate::measure::Curve;
 use crate::plan::{Output, OutputKind, Plan, Quantity};
-use crate::table::Grid;
+use crate::table::{Grid, value_dimension};
+use crate::units::Dimension;
 
 /// More dots of one series hide each other.
 const MOST_DOTS: usize = 400;
@@ -65,7 +66,7 @@ impl<'a> Story<'a> {
                 OutputKind::Map => {
                     panels.extend(quantities().filter_map(|(q, _)| self.map(output_idx, output, q)));
                 }
-                OutputKind::Total | OutputKind::Mixing => panels.extend(self.course(output_idx, output)),
+                OutputKind::Total | OutputKind::Mixing => panels.extend(self.courses(output_idx, output)),
                 OutputKind::Particles => {}
             }
         }
@@ -87,7 +88,7 @@ impl<'a> Story<'a> {
             });
         }
         if !self.references.is_empty() {
-            key.push(KeyEntry { text: "this run".to_owned(), color: INK, look: Look::Dots });
+            key.push(KeyEntry { text: "this run".to_owned(), color: FAINT, look: Look::Dots });
         }
         let references = self.references.iter().enumerate();
         key.extend(references.map(|(idx, name)| KeyEntry {
@@ -178,40 +179,36 @@ impl<'a> Story<'a> {
         self.times.iter().position(is_same).map(time_color)
     }
 
-    /// Total or γ over time, all quantities in one panel.
-    fn course(&self, output_idx: usize, output: &Output) -> Option<Panel> {
-        let mut marks = Vec::new();
-        let mut key = Vec::new();
-        for (q, quantity) in output.quantities.iter().enumerate() {
-            let color = SERIES[q % SERIES.len()];
-            let snapshots = self.of_output(output_idx);
-            let points: Vec<_> =
-                snapshots.map(|snapshot| (snapshot.t, value_at(&snapshot.values, q))).collect();
-            let every = points.len().div_ceil(MOST_DOTS).max(1);
-            marks.push(Mark { points: points.into_iter().step_by(every).collect(), color, look: Look::Dots });
-            key.push(KeyEntry { text: self.names(*quantity), color, look: Look::Dots });
-            for curve in self.curves_of(output_idx, *quantity).filter(|curve| curve.t.is_none()) {
-                let points = curve.x.iter().copied().zip(curve.y.iter().copied()).collect();
-                marks.push(Mark {
-                    points,
-                    color: blend(color, BLACK, 0.25),
-                    look: self.look_of(&curve.reference),
-                });
+    /// Totals or γ over time: a panel for all quantities of one dimension.
+    fn courses(&self, output_idx: usize, output: &Output) -> Vec<Panel> {
+        let dimension = |q: usize| match output.kind {
+            OutputKind::Mixing => Dimension::NONE,
+            kind => value_dimension(self.plan, kind, output.quantities[q], self.n_axes),
+        };
+        let mut groups: Vec<Vec<usize>> = Vec::new();
+        for q in 0..output.quantities.len() {
+            match groups.iter_mut().find(|group| dimension(group[0]) == dimension(q)) {
+                Some(group) => group.push(q),
+                None => groups.push(vec![q]),
             }
         }
+        groups.iter().filter_map(|group| self.course(output_idx, output, group)).collect()
+    }
+
+    fn course(&self, output_idx: usize, output: &Output, group: &[usize]) -> Option<Panel> {
+        let (mut marks, key) = self.course_marks(output_idx, output, group);
         if marks.iter().all(|mark| mark.points.len() < 2) {
             return None;
         }
         let is_mixing = output.kind == OutputKind::Mixing;
-        let shown = match output.quantities.first() {
-            Some(quantity) if !is_mixing => {
-                display::value(self.plan, output, *quantity, self.n_axes, largest(&marks))
-            }
-            _ => Shown::one(),
+        let shown = if is_mixing {
+            Shown::one()
+        } else {
+            display::value(self.plan, output, output.quantities[group[0]], self.n_axes, largest(&marks))
         };
         rescale(&mut marks, self.time_unit.factor, shown.factor);
         let spacing = |is_wide: bool| if is_mixing && is_wide { Spacing::Log } else { Spacing::Linear };
-        let names: Vec<String> = output.quantities.iter().map(|quantity| self.names(*quantity)).collect();
+        let names: Vec<String> = group.iter().map(|q| self.names(output.quantities[*q])).collect();
         Some(Panel {
             title: if is_mixing {
                 format!("γ({})", names.join("; "))
@@ -224,8 +221,38 @@ impl<'a> Story<'a> {
             y: Scale::covering(values_of(&marks), spacing(is_wide(values_of(&marks)))),
             marks,
             heat: None,
-            key: if key.len() > 1 { key } else { Vec::new() },
+            key,
         })
+    }
+
+    /// Dots and references of some quantities over time, SI; a key if there are several. One alone is
+    /// drawn in ink, because colours of the page's key are times.
+    fn course_marks(
+        &self,
+        output_idx: usize,
+        output: &Output,
+        group: &[usize],
+    ) -> (Vec<Mark>, Vec<KeyEntry>) {
+        let (mut marks, mut key) = (Vec::new(), Vec::new());
+        for (place, &q) in group.iter().enumerate() {
+            let quantity = output.quantities[q];
+            let color = if group.len() > 1 { SERIES[place % SERIES.len()] } else { FAINT };
+            let snapshots = self.of_output(output_idx);
+            let points: Vec<_> =
+                snapshots.map(|snapshot| (snapshot.t, value_at(&snapshot.values, q))).collect();
+            let every = points.len().div_ceil(MOST_DOTS).max(1);
+            marks.push(Mark { points: points.into_iter().step_by(every).collect(), color, look: Look::Dots });
+            key.push(KeyEntry { text: self.names(quantity), color, look: Look::Dots });
+            for curve in self.curves_of(output_idx, quantity).filter(|curve| curve.t.is_none()) {
+                let points = curve.x.iter().copied().zip(curve.y.iter().copied()).collect();
+                let look = self.look_of(&curve.reference);
+                marks.push(Mark { points, color: blend(color, BLACK, 0.25), look });
+            }
+        }
+        if key.len() < 2 {
+            key.clear();
+        }
+        (marks, key)
     }
 
     /// The last time of a map over its first two axes of more than one bin; a third is cut in the middle.
