@@ -11,6 +11,7 @@ pub mod plan;
 pub mod report;
 pub mod scenario;
 pub mod source;
+pub mod state;
 pub mod syntax;
 pub mod table;
 pub mod units;

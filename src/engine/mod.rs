@@ -1,2 +1,61 @@
-//! Plan and seed in, snapshots out. (under construction)
+//! Plan and seed in, snapshots out.
+//!
+//! Owns the run: blocks of particles through the stages of the plan. May use the plan, `state` and
+//! `maths`. It deliberately knows no files and prints nothing.
+
+mod amount;
+mod average;
+mod clock;
+mod control;
+mod error;
+mod initial;
+mod mix;
+mod observe;
+mod place;
+mod program;
+mod run;
+mod schedule;
+mod sides;
 pub mod snapshot;
+mod step;
+mod walk;
+
+use crate::plan::Plan;
+pub use control::{Control, Settings, Unattended};
+pub use error::RunError;
+use snapshot::{Outcome, Snapshot};
+
+/// Runs a plan and hands every snapshot to `sink`, in the order of time, then of outputs.
+///
+/// The bytes of the snapshots depend on the plan alone: not on threads, not on other outputs.
+pub fn run(
+    plan: &Plan,
+    settings: &Settings,
+    control: &dyn Control,
+    sink: &mut (dyn FnMut(Snapshot) -> Result<(), RunError> + Send),
+) -> Result<Outcome, RunError> {
+    let Some(n_threads) = settings.threads else {
+        return run_here(plan, settings, control, sink);
+    };
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(n_threads.max(1))
+        .build()
+        .map_err(|error| RunError::Threads(error.to_string()))?;
+    pool.install(|| run_here(plan, settings, control, sink))
+}
+
+/// The number of axes is matched here, once.
+fn run_here(
+    plan: &Plan,
+    settings: &Settings,
+    control: &dyn Control,
+    sink: &mut (dyn FnMut(Snapshot) -> Result<(), RunError> + Send),
+) -> Result<Outcome, RunError> {
+    match plan.axes.len() {
+        0 => run::run::<0>(plan, settings, control, sink),
+        1 => run::run::<1>(plan, settings, control, sink),
+        2 => run::run::<2>(plan, settings, control, sink),
+        3 => run::run::<3>(plan, settings, control, sink),
+        n => Err(program::unsound(&format!("{n} axes"))),
+    }
+}

@@ -3,6 +3,8 @@
 //! Owns every transcendental function that the crate calls. May use nothing else of the crate. It
 //! deliberately never calls the system's library (`f64::exp` and friends pick code by CPU).
 
+pub mod chacha;
+pub mod normal;
 pub mod operator;
 pub mod quadrature;
 pub mod scalar;

@@ -2,6 +2,9 @@
 //!
 //! Owns the tape and its evaluation. May use `maths`. It deliberately has no branches: `if` selects.
 
+mod check;
+mod evaluate;
+
 pub use crate::maths::operator::{Binary, Unary};
 use serde::{Deserialize, Serialize};
 

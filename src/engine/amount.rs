@@ -1,0 +1,74 @@
+//! The carried amount: what must not change.
+//!
+//! Owns sums over all particles and their defect. May use `state`. It deliberately multiplies by no
+//! volume: all particles have the same.
+
+use super::program::{Program, Role};
+use crate::state::particles::{Block, CHUNK};
+use rayon::prelude::*;
+
+/// Sums of one column.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Amount {
+    pub sum: f64,
+    /// Σ|value|
+    pub size: f64,
+    pub lowest: f64,
+    pub highest: f64,
+}
+
+impl Amount {
+    const NONE: Self = Self { sum: 0.0, size: 0.0, lowest: f64::INFINITY, highest: f64::NEG_INFINITY };
+
+    fn of(values: &[f64]) -> Self {
+        values.chunks(CHUNK).map(Self::of_chunk).fold(Self::NONE, Self::add)
+    }
+
+    fn of_chunk(values: &[f64]) -> Self {
+        values.iter().fold(Self::NONE, |amount, &value| {
+            amount.add(Self { sum: value, size: value.abs(), lowest: value, highest: value })
+        })
+    }
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            sum: self.sum + other.sum,
+            size: self.size + other.size,
+            lowest: self.lowest.min(other.lowest),
+            highest: self.highest.max(other.highest),
+        }
+    }
+
+    /// Relative change since `before`.
+    pub fn defect_of(sum: f64, before: &Self) -> f64 {
+        let scale = before.sum.abs().max(before.size);
+        if scale > 0.0 { (sum - before.sum).abs() / scale } else { (sum - before.sum).abs() }
+    }
+}
+
+/// Amounts per column, added in the order of blocks.
+pub fn amounts<const D: usize>(blocks: &[Block<D>], n_columns: usize) -> Vec<Amount> {
+    let partial: Vec<Vec<Amount>> = blocks
+        .par_iter()
+        .map(|block| block.columns.iter().map(|column| Amount::of(column)).collect())
+        .collect();
+    let mut amounts = vec![Amount::NONE; n_columns];
+    for block in partial {
+        amounts.iter_mut().zip(block).for_each(|(amount, part)| *amount = amount.add(part));
+    }
+    amounts
+}
+
+/// Largest relative change per component over its conserved columns.
+pub fn defects<const D: usize>(program: &Program<D>, before: &[Amount], sums: &[f64]) -> Vec<f64> {
+    let n_slots = program.roles.len();
+    let of_component = |component: usize| {
+        let columns = (0..n_slots).filter(|&slot| program.roles[slot] != Role::Mean);
+        let of_slot = |slot: usize| {
+            let column = component * n_slots + slot;
+            Amount::defect_of(sums[column], &before[column])
+        };
+        columns.map(of_slot).fold(0.0, f64::max)
+    };
+    (0..program.n_components()).map(of_component).collect()
+}

@@ -1,0 +1,57 @@
+//! The initial state: positions, and the values of the components there.
+//!
+//! Owns the filling of new blocks. May use `state` and tapes. It deliberately applies no mixing: at
+//! time 0 every stored zone has the value of the expression.
+
+use super::error::RunError;
+use super::place::{Strata, place};
+use super::program::Program;
+use crate::state::particles::{BLOCK, Block, state_bytes};
+use rayon::prelude::*;
+
+/// All blocks of the run.
+pub fn blocks<const D: usize>(program: &Program<D>) -> Result<Vec<Block<D>>, RunError> {
+    let plan = program.plan;
+    let n_particles = plan.particles.count;
+    let bytes = state_bytes(n_particles, D, program.n_columns());
+    let strata = Strata::<D>::new(&plan.axes, n_particles);
+    let n_blocks = n_particles.div_ceil(BLOCK as u64);
+    (0..n_blocks)
+        .into_par_iter()
+        .map(|idx| {
+            let n_in_block = (n_particles - idx * BLOCK as u64).min(BLOCK as u64) as usize;
+            let mut block = Block::<D>::new(idx, n_in_block, program.n_columns())
+                .map_err(|_| RunError::OutOfMemory { bytes })?;
+            place(&plan.axes, plan.particles.placement, &strata, plan.seed, &mut block);
+            fill(program, &mut block)?;
+            Ok(block)
+        })
+        .collect::<Vec<Result<_, RunError>>>()
+        .into_iter()
+        .collect()
+}
+
+/// Evaluates the initial expressions at the positions of a block.
+fn fill<const D: usize>(program: &Program<D>, block: &mut Block<D>) -> Result<(), RunError> {
+    let zeros = vec![0.0; block.n_particles];
+    let mut inputs: [&[f64]; 4] = [&zeros; 4];
+    for (axis, positions) in program.plan.axes.iter().zip(&block.positions) {
+        inputs[axis.index] = positions;
+    }
+    let n_slots = program.roles.len();
+    let mut scratch = Vec::new();
+    for (component_idx, component) in program.plan.components.iter().enumerate() {
+        let columns = &mut block.columns[component_idx * n_slots..][..n_slots];
+        let Some((first, others)) = columns.split_first_mut() else { continue };
+        component.initial.evaluate_block(&inputs, &mut scratch, first);
+        if let Some(idx) = first.iter().position(|value| !value.is_finite()) {
+            return Err(RunError::NonFiniteInitial {
+                component: component.name.clone(),
+                particle: block.idx * BLOCK as u64 + idx as u64,
+                position: block.positions.iter().map(|axis| axis[idx]).collect(),
+            });
+        }
+        others.iter_mut().for_each(|other| other.copy_from_slice(first));
+    }
+    Ok(())
+}

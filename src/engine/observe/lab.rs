@@ -1,0 +1,209 @@
+//! A chunk of particles as it is at the observed instant, in scratch memory.
+//!
+//! Owns the view of a state that is not disturbed by being looked at. May use the stages and `state`.
+//! It deliberately writes to no particle.
+
+use super::super::average::Means;
+use super::super::mix;
+use super::super::program::{Program, Term};
+use super::super::run::Run;
+use super::super::step::Scratch;
+use super::super::walk::{Leap, Noise, Place};
+use crate::state::particles::{Block, CHUNK};
+use std::ops::Range;
+
+/// Which instant is looked at.
+pub enum Instant<const D: usize> {
+    /// The state after the steps done so far.
+    Now,
+    /// Within the next step.
+    Between(Between<D>),
+}
+
+/// A point of the next step, reached by a Brownian bridge.
+pub struct Between<const D: usize> {
+    step: u64,
+    /// Number of the bridge's draws, from the bits of the time: other outputs do not shift it.
+    bridge: u64,
+    along: Leap<D>,
+    across: Leap<D>,
+    pub decays: Vec<Option<f64>>,
+}
+
+impl<const D: usize> Instant<D> {
+    /// The instant `fraction` of the way into step `step` of length `dt`.
+    pub fn between(program: &Program<D>, step: u64, fraction: f64, t: f64, dt: f64) -> Self {
+        let mover = &program.mover;
+        Self::Between(Between {
+            step,
+            bridge: t.to_bits() >> 12,
+            along: mover.leap(fraction * dt, fraction * dt.sqrt()),
+            across: mover.leap(0.0, (fraction * (1.0 - fraction) * dt).sqrt()),
+            decays: program.decays(fraction * dt),
+        })
+    }
+}
+
+/// Positions, bins and values of one chunk at the instant.
+pub struct Lab<const D: usize> {
+    pub n: usize,
+    pub positions: [[f64; CHUNK]; D],
+    /// Bins of the averages.
+    pub slots: [i32; CHUNK],
+    /// Carried columns.
+    pub columns: Vec<Vec<f64>>,
+    /// Per component `Σ η_i W_i / Σ η_i` over the simulated zones: what bin means are made of.
+    pub simulated: Vec<[f64; CHUNK]>,
+    /// Per component ū as the particle sees it.
+    pub mixed: Vec<[f64; CHUNK]>,
+    /// Per component U.
+    pub components: Vec<[f64; CHUNK]>,
+    /// Per species, as if nothing had reacted, and as it is.
+    pub unreacted: Vec<[f64; CHUNK]>,
+    pub species: Vec<[f64; CHUNK]>,
+    scratch: Box<Scratch<D>>,
+    bridge_noise: Noise<D>,
+}
+
+impl<const D: usize> Lab<D> {
+    pub fn new(program: &Program<D>) -> Box<Self> {
+        let n_species = program.plan.species.len();
+        let zeros = |n| vec![[0.0; CHUNK]; n];
+        Box::new(Self {
+            n: 0,
+            positions: [[0.0; CHUNK]; D],
+            slots: [0; CHUNK],
+            columns: vec![vec![0.0; CHUNK]; program.n_columns()],
+            simulated: zeros(program.n_components()),
+            mixed: zeros(program.n_components()),
+            components: zeros(program.n_components()),
+            unreacted: zeros(n_species),
+            species: zeros(n_species),
+            scratch: Scratch::new(0),
+            bridge_noise: [[0.0; CHUNK]; D],
+        })
+    }
+
+    pub fn positions(&self) -> [&[f64]; D] {
+        self.positions.each_ref().map(|axis| &axis[..self.n])
+    }
+
+    pub fn slots(&self) -> &[i32] {
+        &self.slots[..self.n]
+    }
+}
+
+/// Fills a lab with one chunk: positions, bins and carried values at the instant, before any mixing
+/// within the step that the instant lies in.
+pub struct Load<'a, const D: usize> {
+    pub run: &'a Run<'a, D>,
+    pub instant: &'a Instant<D>,
+    pub block: &'a Block<D>,
+    pub range: Range<usize>,
+    pub lab: &'a mut Lab<D>,
+}
+
+impl<const D: usize> pulp::NullaryFnOnce for Load<'_, D> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { run, instant, block, range, lab } = self;
+        let program = &run.program;
+        let n = range.len();
+        lab.n = n;
+        for (target, source) in lab.positions.iter_mut().zip(&block.positions) {
+            target[..n].copy_from_slice(&source[range.clone()]);
+        }
+        for (target, source) in lab.columns.iter_mut().zip(&block.columns) {
+            target.resize(n, 0.0);
+            target.copy_from_slice(&source[range.clone()]);
+        }
+        let mut positions = lab.positions.each_mut().map(|axis| &mut axis[..n]);
+        let slots = &mut lab.slots[..n];
+        program.grid.locate(positions.each_ref().map(|axis| &**axis), slots);
+        if let Some(decays) = &run.pending {
+            let mut columns = mix::cut(&mut lab.columns, 0..n);
+            mix::relax(program, &run.means, decays, slots, &mut columns, |_, _| {});
+        }
+        if let Instant::Between(between) = instant {
+            let chunk_idx = (range.start / CHUNK) as u64;
+            let place = Place { block_idx: block.idx, chunk_idx, step: between.step };
+            let words = &mut lab.scratch.words;
+            program.mover.draw(&run.walk, place, words, &mut lab.scratch.noise);
+            let place = Place { step: between.bridge, ..place };
+            program.mover.draw(&run.bridge, place, words, &mut lab.bridge_noise);
+            between.along.apply(&mut positions, &lab.scratch.noise);
+            between.across.apply(&mut positions, &lab.bridge_noise);
+            for (rule, positions) in program.rules.iter().zip(&mut positions) {
+                // A position that is not finite stops the step itself.
+                let _ = rule.apply(positions);
+            }
+            program.grid.locate(positions.each_ref().map(|axis| &**axis), slots);
+        }
+    }
+}
+
+/// From carried values to concentrations, once the means of the instant are known.
+pub struct Resolve<'a, const D: usize> {
+    pub program: &'a Program<'a, D>,
+    pub instant: &'a Instant<D>,
+    pub means: &'a Means,
+    pub lab: &'a mut Lab<D>,
+}
+
+impl<const D: usize> pulp::NullaryFnOnce for Resolve<'_, D> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { program, instant, means, lab } = self;
+        let n = lab.n;
+        if let Instant::Between(between) = instant {
+            let mut columns = mix::cut(&mut lab.columns, 0..n);
+            mix::relax(program, means, &between.decays, &lab.slots[..n], &mut columns, |_, _| {});
+        }
+        let n_slots = program.roles.len();
+        for component in 0..program.n_components() {
+            let columns = &lab.columns[component * n_slots..][..n_slots];
+            weighted(&program.mean_weights, columns, &mut lab.simulated[component]);
+            if program.has_mixing() {
+                let own = &lab.simulated[component][..n];
+                mix::gather(
+                    program,
+                    &means.mixed[component],
+                    &lab.slots[..n],
+                    own,
+                    &mut lab.mixed[component],
+                );
+            }
+            let (mixed, target) = (&lab.mixed[component], &mut lab.components[component]);
+            total(&program.terms, columns, mixed, &mut target[..n]);
+        }
+        super::chemistry::speciate(program, n, &lab.components, &mut lab.unreacted, &mut lab.species);
+    }
+}
+
+#[inline(always)]
+fn weighted(weights: &[(usize, f64)], columns: &[Vec<f64>], target: &mut [f64; CHUNK]) {
+    for (rank, &(slot, weight)) in weights.iter().enumerate() {
+        for (target, value) in target.iter_mut().zip(&columns[slot]) {
+            *target = if rank == 0 { weight * value } else { *target + weight * value };
+        }
+    }
+}
+
+/// `U = Σ_i η_i W_i`, zones in order.
+#[inline(always)]
+fn total(terms: &[Term], columns: &[Vec<f64>], mixed: &[f64; CHUNK], target: &mut [f64]) {
+    target.fill(0.0);
+    for term in terms {
+        let (fraction, values) = match *term {
+            Term::Column { slot, fraction } => (fraction, &columns[slot][..]),
+            Term::Mean { fraction } => (fraction, &mixed[..]),
+        };
+        for (target, value) in target.iter_mut().zip(values) {
+            *target += fraction * value;
+        }
+    }
+}

@@ -1,0 +1,191 @@
+//! Outputs due: looks at the state and hands out snapshots.
+//!
+//! Owns the passes of an observation. May use the stages and `state`. It deliberately disturbs
+//! nothing: a run with one output more gives the same bytes for all others.
+
+mod chemistry;
+mod lab;
+mod mixing;
+mod tally;
+
+use super::average::{Means, blocks_per_group};
+use super::error::RunError;
+use super::program::unsound;
+use super::run::{Run, dispatch};
+use super::schedule::Due;
+use super::snapshot::{Snapshot, Values};
+use crate::plan::OutputKind;
+use crate::state::grid::Grid;
+use crate::state::particles::{CHUNK, state_bytes};
+pub use lab::Instant;
+use lab::{Lab, Load, Resolve};
+use mixing::Mixing;
+use rayon::prelude::*;
+use std::borrow::Cow;
+use tally::Tally;
+
+/// All snapshots of one due time, in the order of outputs.
+pub fn observe<const D: usize>(
+    run: &Run<D>,
+    due: &Due,
+    instant: &Instant<D>,
+) -> Result<Vec<Snapshot>, RunError> {
+    let program = &run.program;
+    let means = means(run, instant);
+    let mut own_means: Vec<(Grid<D>, Means)> = Vec::new();
+    for &output_idx in &due.outputs {
+        let output = &program.plan.outputs[output_idx];
+        if output.kind == OutputKind::Mixing && !program.has_mixing() {
+            let grid = tally::output_grid(program, output).ok_or_else(bad_bins)?;
+            let means = average(run, instant, &grid);
+            own_means.push((grid, means));
+        }
+    }
+    let mut next_own = own_means.iter();
+    let mut tallies = Vec::new();
+    for &output_idx in &due.outputs {
+        let output = &program.plan.outputs[output_idx];
+        let mixing = (output.kind == OutputKind::Mixing).then(|| match next_own.next() {
+            Some((grid, means)) => Mixing::new(program, output, means, Some(grid)),
+            None => Mixing::new(program, output, &means, None),
+        });
+        tallies.push(Tally::new(program, output, mixing).ok_or_else(bad_bins)?);
+    }
+    let values = sum(run, instant, &means, &tallies);
+    let snapshot = |(&output_idx, values)| Snapshot { output_idx, t: due.t, values };
+    Ok(due.outputs.iter().zip(values).map(snapshot).collect())
+}
+
+fn bad_bins() -> RunError {
+    unsound("an output whose bins do not make a grid")
+}
+
+/// The bin means of the instant; nothing where no particle sees a mean.
+fn means<'a, const D: usize>(run: &'a Run<D>, instant: &Instant<D>) -> Cow<'a, Means> {
+    match instant {
+        _ if !run.program.has_mixing() => Cow::Owned(Means::default()),
+        Instant::Now if run.is_averaged => Cow::Borrowed(&run.means),
+        Instant::Now | Instant::Between(_) => Cow::Owned(average(run, instant, &run.program.grid)),
+    }
+}
+
+/// Both passes over the particles, and what comes of them.
+fn sum<const D: usize>(
+    run: &Run<D>,
+    instant: &Instant<D>,
+    means: &Means,
+    tallies: &[Tally<D>],
+) -> Vec<Values> {
+    let first_at = offsets(tallies, |tally| tally.n_first());
+    let second_at = offsets(tallies, |tally| tally.n_second());
+    let (n_first, n_second) = (first_at[tallies.len()], second_at[tallies.len()]);
+    let mut first = Vec::new();
+    if tallies.iter().any(|tally| !matches!(tally, Tally::Particles)) {
+        first = sweep(run, instant, Some(means), n_first, |lab, sums| {
+            for (idx, tally) in tallies.iter().enumerate() {
+                tally.add_first(lab, &mut sums[first_at[idx]..first_at[idx + 1]]);
+            }
+        });
+    }
+    let mut second = Vec::new();
+    if n_second > 0 {
+        second = sweep(run, instant, Some(means), n_second, |lab, sums| {
+            for (idx, tally) in tallies.iter().enumerate() {
+                let first = &first[first_at[idx]..first_at[idx + 1]];
+                tally.add_second(lab, first, &mut sums[second_at[idx]..second_at[idx + 1]]);
+            }
+        });
+    }
+    let values = tallies.iter().enumerate().map(|(idx, tally)| {
+        let first = first.get(first_at[idx]..first_at[idx + 1]).unwrap_or_default();
+        let second = second.get(second_at[idx]..second_at[idx + 1]).unwrap_or_default();
+        tally.values(&run.program, first, second).unwrap_or_else(|| particles(run, instant, means))
+    });
+    values.collect()
+}
+
+/// Where the sums of each tally start, and where the last one ends.
+fn offsets<const D: usize>(tallies: &[Tally<D>], len: impl Fn(&Tally<D>) -> usize) -> Vec<usize> {
+    let mut offsets = vec![0];
+    for tally in tallies {
+        offsets.push(offsets[offsets.len() - 1] + len(tally));
+    }
+    offsets
+}
+
+/// Bin means of the carried columns at the instant.
+fn average<const D: usize>(run: &Run<D>, instant: &Instant<D>, grid: &Grid<D>) -> Means {
+    let stride = run.program.n_columns() + 1;
+    let sums = sweep(run, instant, None, grid.n_slots() * stride, |lab, sums| {
+        let mut slots = [0; CHUNK];
+        grid.locate(lab.positions(), &mut slots[..lab.n]);
+        super::average::accumulate(&slots[..lab.n], &lab.columns, 0..lab.n, 1, sums);
+    });
+    let mut means = Means::default();
+    means.assign(&run.program, &sums);
+    means
+}
+
+/// Sums over all particles, chunk by chunk in groups of blocks, merged in order. Concentrations are
+/// resolved if means are given.
+fn sweep<const D: usize>(
+    run: &Run<D>,
+    instant: &Instant<D>,
+    means: Option<&Means>,
+    n_sums: usize,
+    add: impl Fn(&Lab<D>, &mut [f64]) + Sync,
+) -> Vec<f64> {
+    let n_particles = run.program.plan.particles.count;
+    let bytes = state_bytes(n_particles, D, run.program.n_columns());
+    let groups = run.blocks.par_chunks(blocks_per_group(n_particles, bytes, n_sums));
+    let partial = groups.map_init(
+        || Lab::new(&run.program),
+        |lab, blocks| {
+            let mut sums = vec![0.0; n_sums];
+            for block in blocks {
+                for range in block.chunks() {
+                    dispatch(run.arch, Load { run, instant, block, range, lab });
+                    if let Some(means) = means {
+                        dispatch(run.arch, Resolve { program: &run.program, instant, means, lab });
+                    }
+                    add(lab, &mut sums);
+                }
+            }
+            sums
+        },
+    );
+    let partial: Vec<Vec<f64>> = partial.collect();
+    let mut merged = vec![0.0; n_sums];
+    for group in partial {
+        merged.iter_mut().zip(group).for_each(|(sum, part)| *sum += part);
+    }
+    merged
+}
+
+/// Every particle, in order.
+fn particles<const D: usize>(run: &Run<D>, instant: &Instant<D>, means: &Means) -> Values {
+    let n_species = run.program.plan.species.len();
+    let per_block = run.blocks.par_iter().map_init(
+        || Lab::new(&run.program),
+        |lab, block| {
+            let mut columns = vec![Vec::with_capacity(block.n_particles); D + n_species];
+            for range in block.chunks() {
+                dispatch(run.arch, Load { run, instant, block, range, lab });
+                dispatch(run.arch, Resolve { program: &run.program, instant, means, lab });
+                let n = lab.n;
+                let sources = lab.positions.iter().chain(&lab.species);
+                columns
+                    .iter_mut()
+                    .zip(sources)
+                    .for_each(|(column, source)| column.extend_from_slice(&source[..n]));
+            }
+            columns
+        },
+    );
+    let per_block: Vec<Vec<Vec<f64>>> = per_block.collect();
+    let column = |idx: usize| per_block.iter().flat_map(|columns| columns[idx].iter().copied()).collect();
+    Values::Particles {
+        positions: (0..D).map(column).collect(),
+        concentrations: (D..D + n_species).map(column).collect(),
+    }
+}

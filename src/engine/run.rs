@@ -1,0 +1,306 @@
+//! The loop over steps.
+//!
+//! Owns the state of a run and its checks. May use all stages. It deliberately works on no particle:
+//! passes do.
+
+use super::amount::{self, Amount};
+use super::average::{self, Means};
+use super::clock::Clock;
+use super::control::{Control, Settings};
+use super::error::RunError;
+use super::observe::{self, Instant};
+use super::program::{Program, Work};
+use super::schedule::{Due, schedule, step_length};
+use super::snapshot::{Outcome, Snapshot};
+use super::step::{OnBlock, Pass, Scratch, Trouble};
+use super::{initial, walk::Leap};
+use crate::plan::Plan;
+use crate::state::particles::{Block, state_bytes};
+use crate::state::stream::{Purpose, Stream};
+use pulp::Arch;
+use rayon::prelude::*;
+
+/// Relative change of a carried amount that stops a run.
+const LOST: f64 = 1e-9;
+
+/// Negative values of this size, relative to the largest initial value, are rounding.
+const ROUNDING: f64 = 1e-12;
+
+type Sink<'a> = &'a mut (dyn FnMut(Snapshot) -> Result<(), RunError> + Send);
+
+/// Everything that lives as long as the run.
+pub struct Run<'a, const D: usize> {
+    pub program: Program<'a, D>,
+    pub arch: Option<Arch>,
+    pub blocks: Vec<Block<D>>,
+    pub walk: Stream,
+    pub bridge: Stream,
+    /// Of the last `Average`.
+    pub means: Means,
+    /// Decays of a relaxation that the next pass will do.
+    pub pending: Option<Vec<Option<f64>>>,
+    /// Whether `means` are those of the positions now.
+    pub is_averaged: bool,
+    groups: Vec<Group>,
+    before: Vec<Amount>,
+    limits: Vec<f64>,
+}
+
+/// Sums and the first trouble of consecutive blocks.
+#[derive(Default)]
+struct Group {
+    sums: Vec<f64>,
+    trouble: Option<Trouble>,
+}
+
+pub fn run<const D: usize>(
+    plan: &Plan,
+    settings: &Settings,
+    control: &dyn Control,
+    sink: Sink,
+) -> Result<Outcome, RunError> {
+    let mut clock = Clock::start();
+    let dues = schedule(plan)?;
+    let mut run = Run::<D>::new(plan, settings)?;
+    let mut loop_clock = Clock::start();
+    let mut dues = dues.iter().peekable();
+    let mut hand_out =
+        |run: &Run<D>, due: &Due, instant: Instant<D>, clock: &mut Clock, loop_clock: &mut Clock| {
+            for snapshot in observe::observe(run, due, &instant)? {
+                loop_clock.away(|| clock.away(|| sink(snapshot)))?;
+            }
+            Ok::<(), RunError>(())
+        };
+    for step in 0..=plan.time.n_steps {
+        while let Some(due) = dues.next_if(|due| due.steps == step) {
+            let instant = run.instant(due);
+            hand_out(&run, due, instant, &mut clock, &mut loop_clock)?;
+        }
+        if control.is_cancelled() {
+            return Err(RunError::Cancelled);
+        }
+        if step < plan.time.n_steps {
+            run.step(step)?;
+            control.step_done(step + 1, plan.time.n_steps);
+        }
+    }
+    let loop_wall = loop_clock.wall();
+    let mass_defect = run.finish()?;
+    Ok(Outcome {
+        n_steps: plan.time.n_steps,
+        n_particles: plan.particles.count,
+        mass_defect,
+        loop_wall,
+        wall: clock.wall(),
+        cpu: clock.cpu(),
+        state_bytes: state_bytes(plan.particles.count, D, run.program.n_columns()),
+    })
+}
+
+impl<'a, const D: usize> Run<'a, D> {
+    fn new(plan: &'a Plan, settings: &Settings) -> Result<Self, RunError> {
+        let program = Program::<D>::new(plan)?;
+        let blocks = initial::blocks(&program)?;
+        let before = amount::amounts(&blocks, program.n_columns());
+        let limits = limits(&program, &before);
+        let sums_len = program.grid.n_slots() * (program.n_columns() + 1);
+        let bytes = state_bytes(plan.particles.count, D, program.n_columns());
+        let blocks_per_group = average::blocks_per_group(plan.particles.count, bytes, sums_len);
+        let n_groups = blocks.len().div_ceil(blocks_per_group);
+        let groups = (0..n_groups).map(|_| Group::default()).collect();
+        Ok(Self {
+            arch: (!settings.is_narrow).then(Arch::new),
+            walk: Stream::new(plan.seed, Purpose::Walk),
+            bridge: Stream::new(plan.seed, Purpose::Bridge),
+            means: Means::default(),
+            pending: None,
+            is_averaged: false,
+            program,
+            blocks,
+            groups,
+            before,
+            limits,
+        })
+    }
+
+    /// How the state is to be seen at a due time.
+    fn instant(&self, due: &Due) -> Instant<D> {
+        if due.fraction == 0.0 {
+            return Instant::Now;
+        }
+        let dt = step_length(&self.program.plan.time, due.steps);
+        Instant::between(&self.program, due.steps, due.fraction, due.t, dt)
+    }
+
+    /// One step: the passes of the plan.
+    fn step(&mut self, step: u64) -> Result<(), RunError> {
+        let dt = step_length(&self.program.plan.time, step);
+        let leap = self.program.mover.leap(dt, dt.sqrt());
+        let passes = self.program.passes.clone();
+        for work in passes {
+            self.is_averaged &= !work.moves;
+            let mixes = work.mixes && self.pending.is_some();
+            self.pass(Work { mixes, ..work }, step, leap)?;
+            if work.mixes {
+                self.pending = None;
+            }
+            if work.averages {
+                self.pending = Some(self.program.decays(dt));
+                self.is_averaged = true;
+                self.check_amounts(step)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// One pass over all blocks, in parallel over groups.
+    fn pass(&mut self, work: Work, step: u64, leap: Leap<D>) -> Result<(), RunError> {
+        let stride = self.program.n_columns() + 1;
+        let sums_len = if work.averages { self.program.grid.n_slots() * stride } else { 0 };
+        let n_lanes = average::lanes(sums_len);
+        let pass = Pass {
+            program: &self.program,
+            work,
+            step,
+            leap,
+            stream: &self.walk,
+            means: &self.means,
+            decays: self.pending.as_deref().unwrap_or_default(),
+            limits: &self.limits,
+            n_lanes,
+        };
+        let arch = self.arch;
+        let blocks_per_group = self.blocks.len().div_ceil(self.groups.len());
+        let groups = self.blocks.par_chunks_mut(blocks_per_group).zip(&mut self.groups);
+        groups.for_each_init(
+            || Scratch::<D>::new(sums_len * n_lanes),
+            |scratch, (blocks, group)| {
+                scratch.sums.fill(0.0);
+                for block in blocks {
+                    let on_block = OnBlock { pass: &pass, block, scratch, trouble: &mut group.trouble };
+                    dispatch(arch, on_block);
+                }
+                group.sums.clear();
+                group.sums.resize(sums_len, 0.0);
+                average::fold_lanes(&scratch.sums, n_lanes, stride, &mut group.sums);
+            },
+        );
+        if let Some(trouble) = self.groups.iter().find_map(|group| group.trouble) {
+            return Err(self.explain(trouble, step));
+        }
+        if work.averages {
+            self.merge();
+        }
+        Ok(())
+    }
+
+    /// Sums of groups in their order, then means.
+    fn merge(&mut self) {
+        let Some((first, others)) = self.groups.split_first_mut() else { return };
+        for group in others {
+            first.sums.iter_mut().zip(&group.sums).for_each(|(sum, part)| *sum += part);
+        }
+        self.means.assign(&self.program, &first.sums);
+    }
+
+    fn check_amounts(&self, step: u64) -> Result<(), RunError> {
+        if self.means.totals.iter().any(|total| !total.is_finite()) {
+            return Err(self.find_non_finite(step));
+        }
+        let defects = amount::defects(&self.program, &self.before, &self.means.totals);
+        match defects.iter().position(|&defect| defect > LOST) {
+            None => Ok(()),
+            Some(idx) => Err(RunError::MassLost {
+                step: step + 1,
+                component: self.component_name(idx),
+                defect: defects[idx],
+            }),
+        }
+    }
+
+    fn component_name(&self, idx: usize) -> String {
+        self.program.plan.components[idx].name.clone()
+    }
+
+    /// Names the first particle whose value is not finite, or the largest if only a sum is not.
+    #[cold]
+    fn find_non_finite(&self, step: u64) -> RunError {
+        let n_slots = self.program.roles.len();
+        for block in &self.blocks {
+            for (column_idx, column) in block.columns.iter().enumerate() {
+                if let Some(idx) = column.iter().position(|value| !value.is_finite()) {
+                    let component = self.component_name(column_idx / n_slots);
+                    let particle = block.first() + idx as u64;
+                    return RunError::NonFiniteConcentration { step: step + 1, particle, component };
+                }
+            }
+        }
+        let column = self.means.totals.iter().position(|total| !total.is_finite()).unwrap_or(0);
+        let component = self.component_name(column / n_slots);
+        RunError::NonFiniteConcentration { step: step + 1, particle: 0, component }
+    }
+
+    /// Names the particle behind a trouble.
+    #[cold]
+    fn explain(&self, trouble: Trouble, step: u64) -> RunError {
+        match trouble {
+            Trouble::Position { particle } => RunError::NonFinitePosition { step: step + 1, particle },
+            Trouble::Negative { component, first, value } => {
+                let particle = self.find_below(component, first);
+                // The relaxation of a fused pass belongs to the step before.
+                RunError::NegativeConcentration {
+                    step,
+                    particle,
+                    component: self.component_name(component),
+                    value,
+                }
+            }
+        }
+    }
+
+    fn find_below(&self, component: usize, first: u64) -> u64 {
+        let n_slots = self.program.roles.len();
+        let limit = self.limits[component];
+        let Some(block) = self.blocks.iter().rfind(|block| block.first() <= first) else { return first };
+        let start = (first - block.first()) as usize;
+        let columns = &block.columns[component * n_slots..][..n_slots];
+        let found =
+            columns.iter().filter_map(|column| column[start..].iter().position(|&value| value < limit));
+        first + found.min().unwrap_or(0) as u64
+    }
+
+    /// Does what is pending and compares the amounts.
+    fn finish(&mut self) -> Result<Vec<f64>, RunError> {
+        if self.pending.is_some() {
+            let step = self.program.plan.time.n_steps;
+            let leap = self.program.mover.leap(0.0, 0.0);
+            self.pass(Work { mixes: true, ..Work::default() }, step, leap)?;
+            self.pending = None;
+        }
+        let after: Vec<f64> =
+            amount::amounts(&self.blocks, self.program.n_columns()).iter().map(|amount| amount.sum).collect();
+        Ok(amount::defects(&self.program, &self.before, &after))
+    }
+}
+
+/// Runs an operation in the widest code of this machine, or in baseline code.
+#[inline(always)]
+pub fn dispatch<T: pulp::NullaryFnOnce>(arch: Option<Arch>, operation: T) -> T::Output {
+    match arch {
+        Some(arch) => arch.dispatch(operation),
+        None => operation.call(),
+    }
+}
+
+/// Smallest value allowed per component: none where the initial values are negative somewhere.
+fn limits<const D: usize>(program: &Program<D>, before: &[Amount]) -> Vec<f64> {
+    let n_slots = program.roles.len();
+    (0..program.n_components())
+        .map(|component| {
+            let amounts = &before[component * n_slots..][..n_slots];
+            let lowest = amounts.iter().map(|amount| amount.lowest).fold(f64::INFINITY, f64::min);
+            let highest = amounts.iter().map(|amount| amount.highest).fold(0.0, f64::max);
+            if lowest >= 0.0 { -ROUNDING * highest } else { f64::NEG_INFINITY }
+        })
+        .collect()
+}

@@ -1,0 +1,113 @@
+//! One pass over a block: any of mix, move, bound and average, chunk by chunk.
+//!
+//! Owns the order of work within a chunk. May use the stages and `state`. It deliberately knows
+//! nothing of other blocks: a fused step and separate passes run this same code.
+
+use super::average::{self, Means};
+use super::mix;
+use super::program::{Program, Work};
+use super::walk::{Leap, Noise, Place};
+use crate::maths::chacha::{DRAW, Words};
+use crate::state::particles::{Block, CHUNK};
+use crate::state::stream::Stream;
+
+/// What one thread needs to work on a chunk.
+pub struct Scratch<const D: usize> {
+    pub words: [Words; 2],
+    pub noise: Noise<D>,
+    pub slots: [i32; CHUNK],
+    /// Sums per slot and lane.
+    pub sums: Vec<f64>,
+}
+
+impl<const D: usize> Scratch<D> {
+    pub fn new(sums_len: usize) -> Box<Self> {
+        Box::new(Self {
+            words: [[0; DRAW]; 2],
+            noise: [[0.0; CHUNK]; D],
+            slots: [0; CHUNK],
+            sums: vec![0.0; sums_len],
+        })
+    }
+}
+
+/// The first thing that went wrong in a group of blocks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Trouble {
+    Position {
+        particle: u64,
+    },
+    /// A value below the limit of its component, somewhere in this chunk.
+    Negative {
+        component: usize,
+        first: u64,
+        value: f64,
+    },
+}
+
+/// Constants of a pass, the same for all blocks.
+pub struct Pass<'a, const D: usize> {
+    pub program: &'a Program<'a, D>,
+    pub work: Work,
+    /// Number of the step, from 0.
+    pub step: u64,
+    pub leap: Leap<D>,
+    pub stream: &'a Stream,
+    /// Means and decays of the relaxation.
+    pub means: &'a Means,
+    pub decays: &'a [Option<f64>],
+    /// Smallest value allowed per component.
+    pub limits: &'a [f64],
+    pub n_lanes: usize,
+}
+
+/// One block of a pass, to be dispatched to wide or narrow code.
+pub struct OnBlock<'a, const D: usize> {
+    pub pass: &'a Pass<'a, D>,
+    pub block: &'a mut Block<D>,
+    pub scratch: &'a mut Scratch<D>,
+    pub trouble: &'a mut Option<Trouble>,
+}
+
+impl<const D: usize> pulp::NullaryFnOnce for OnBlock<'_, D> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { pass, block, scratch, trouble } = self;
+        let program = pass.program;
+        let mut columns = std::mem::take(&mut block.columns);
+        for (chunk_idx, range) in block.chunks().enumerate() {
+            let n = range.len();
+            let first = block.first() + range.start as u64;
+            let slots = &mut scratch.slots[..n];
+            let mut positions = block.positions.each_mut().map(|axis| &mut axis[range.clone()]);
+            if pass.work.mixes {
+                program.grid.locate(positions.each_ref().map(|axis| &**axis), slots);
+                let mut chunk = mix::cut(&mut columns, range.clone());
+                mix::relax(program, pass.means, pass.decays, slots, &mut chunk, |component, value| {
+                    if value < pass.limits[component] {
+                        trouble.get_or_insert(Trouble::Negative { component, first, value });
+                    }
+                });
+            }
+            if pass.work.moves {
+                let place = Place { block_idx: block.idx, chunk_idx: chunk_idx as u64, step: pass.step };
+                program.mover.draw(pass.stream, place, &mut scratch.words, &mut scratch.noise);
+                pass.leap.apply(&mut positions, &scratch.noise);
+            }
+            if pass.work.bounds {
+                for (rule, positions) in program.rules.iter().zip(&mut positions) {
+                    if let Err(idx) = rule.apply(positions) {
+                        trouble.get_or_insert(Trouble::Position { particle: first + idx as u64 });
+                    }
+                }
+            }
+            if pass.work.averages {
+                program.grid.locate(positions.each_ref().map(|axis| &**axis), slots);
+                average::accumulate(slots, &columns, range, pass.n_lanes, &mut scratch.sums);
+            }
+        }
+        block.columns = columns;
+    }
+}

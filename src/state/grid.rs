@@ -1,0 +1,105 @@
+//! Rectangular bins over the active axes.
+//!
+//! Owns the map from a position to the index of a bin. May use nothing else of the crate. It
+//! deliberately accumulates nothing.
+
+/// Equal bins along each axis; the first axis is slowest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grid<const D: usize> {
+    low: [f64; D],
+    high: [f64; D],
+    inverse_width: [f64; D],
+    bins: [usize; D],
+    /// Axes that a particle may leave.
+    is_open: [bool; D],
+}
+
+impl<const D: usize> Grid<D> {
+    /// `None` if an axis has no bins or no length, or if there are more than 2³¹ − 2 bins.
+    pub fn new(low: [f64; D], high: [f64; D], bins: [usize; D], is_open: [bool; D]) -> Option<Self> {
+        let n_bins = bins.iter().try_fold(1_usize, |product, &n| product.checked_mul(n))?;
+        let is_sound =
+            (0..D).all(|axis| high[axis] - low[axis] > 0.0 && (high[axis] - low[axis]).is_finite());
+        if n_bins == 0 || n_bins >= i32::MAX as usize || !is_sound {
+            return None;
+        }
+        let inverse_width = std::array::from_fn(|axis| bins[axis] as f64 / (high[axis] - low[axis]));
+        Some(Self { low, high, inverse_width, bins, is_open })
+    }
+
+    /// The same space with other bins.
+    pub fn with_bins(&self, bins: [usize; D]) -> Option<Self> {
+        Self::new(self.low, self.high, bins, self.is_open)
+    }
+
+    pub fn n_bins(&self) -> usize {
+        self.bins.iter().product()
+    }
+
+    /// Bins and one slot more for the particles outside open sides.
+    pub fn n_slots(&self) -> usize {
+        self.n_bins() + 1
+    }
+
+    pub fn bins(&self) -> [usize; D] {
+        self.bins
+    }
+
+    pub fn has_open_side(&self) -> bool {
+        self.is_open.contains(&true)
+    }
+
+    /// Slot of each particle: its bin, or `n_bins` outside an open side.
+    ///
+    /// A position on an inner face belongs to the upper bin, on the upper end to the last.
+    #[inline(always)]
+    pub fn locate(&self, positions: [&[f64]; D], slots: &mut [i32]) {
+        slots.fill(0);
+        for (axis, positions) in positions.iter().enumerate() {
+            let (low, inverse_width) = (self.low[axis], self.inverse_width[axis]);
+            let (n, last) = (self.bins[axis] as i32, self.bins[axis] as i32 - 1);
+            if n > 1 {
+                for (slot, &x) in slots.iter_mut().zip(*positions) {
+                    let along = (((x - low) * inverse_width) as i32).max(0).min(last);
+                    *slot = *slot * n + along;
+                }
+            }
+        }
+        for (axis, positions) in positions.iter().enumerate() {
+            if self.is_open[axis] {
+                let (low, high, outside) = (self.low[axis], self.high[axis], self.n_bins() as i32);
+                for (slot, &x) in slots.iter_mut().zip(*positions) {
+                    *slot = if x >= low && x <= high { *slot } else { outside };
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn first_axis_is_slowest_and_ends_belong_inside() {
+        let grid = Grid::new([0.0, -1.0], [2.0, 1.0], [2, 4], [false, false]).unwrap();
+        let mut slots = [9; 4];
+        grid.locate([&[0.0, 2.0, 0.99, 1.0], &[-1.0, 1.0, -0.5, 0.49]], &mut slots);
+        assert_eq!(slots, [0, 7, 1, 6]);
+    }
+
+    #[test]
+    fn outside_an_open_side_is_the_last_slot() {
+        let grid = Grid::new([0.0], [1.0], [10], [true]).unwrap();
+        let mut slots = [0; 4];
+        grid.locate([&[-1e-300, 1.5, 1.0, f64::INFINITY]], &mut slots);
+        assert_eq!(slots, [10, 10, 9, 10]);
+    }
+
+    #[test]
+    fn unsound_grids_are_refused() {
+        assert!(Grid::new([0.0], [0.0], [1], [false]).is_none());
+        assert!(Grid::new([0.0], [1.0], [0], [false]).is_none());
+        assert!(Grid::new([0.0, 0.0], [1.0, 1.0], [1 << 20, 1 << 20], [false; 2]).is_none());
+    }
+}
