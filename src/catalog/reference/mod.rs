@@ -7,6 +7,7 @@ mod arguments;
 mod front;
 mod front_covariance;
 mod front_gamma;
+mod front_limit;
 mod gaussian_closure;
 mod gaussian_pulse;
 mod inflow;
@@ -16,6 +17,8 @@ mod solutions;
 mod step_front;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod values;
 mod well_mixed;
 
 use crate::units::Dimension;
@@ -25,6 +28,8 @@ pub const ALL: &[Item] = &[
     step_front::ITEM,
     well_mixed::FRONT,
     well_mixed::TOTAL,
+    front_limit::FRONT,
+    front_limit::TOTAL,
     front_covariance::ITEM,
     front_covariance::MULTIRATE,
     front_gamma::ITEM,
