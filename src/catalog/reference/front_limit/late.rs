@@ -90,7 +90,7 @@ type Polynomial = Vec<f64>;
 /// `p_nk` of the moments' series.
 ///
 /// Equation: `(n/2) p_{n,k+1} = ¼p'' + (½−n) ξ p' + [(n²−n) ξ² + k − n/2] p − (n/2√π)(q' − 2(n−1) ξ q)
-/// + (n(n−1)/4π) r`, with `p = p_{n,k}`, `q = p_{n−1,k}`, `r = p_{n−2,k}`.
+/// plus (n(n−1)/4π) r`, with `p = p_{n,k}`, `q = p_{n−1,k}`, `r = p_{n−2,k}`.
 /// Symbols: n order of the moment, k power of 1/(χt).
 /// Dimensions and range: none.
 /// Source: `∂m_n/∂t = D [m_n'' + 2n ū' m_{n−1}' + n(n−1) ū'² m_{n−2}] − (nχ/2) m_n`, from the particle model.
