@@ -4,6 +4,7 @@
 //! refused at its line, with the one that would. May use `scenario` for the places.
 
 use super::cost::{self, Cost};
+use super::explain::number;
 use super::passes::Draft;
 use super::{Plan, ZoneRate};
 use crate::diagnostic::Diagnostic;
@@ -96,9 +97,10 @@ fn travel(scenario: &Scenario, plan: &Plan, limits: &mut Vec<Limit>, diagnostics
                     ),
                 )
                 .at(scenario.run.step_span, format!("{step} s"))
-                .found(format!("{:.3e} m in a step", advective + 3.0 * dispersive))
-                .expected(format!("less than the extent, {extent:.3e} m"))
-                .note("positions stay right in law; what happens between two outputs is not resolved"),
+                .found(format!("{} m in a step", short(advective + 3.0 * dispersive)))
+                .expected(format!("less than the extent, {} m", short(extent)))
+                .note("positions stay right in law; what happens between two outputs is not resolved")
+                .help("use a shorter step, or a `frame` that moves with the flow"),
             );
         }
     }
@@ -132,9 +134,9 @@ fn particles_per_bin(
         message
             .at(bins_span(scenario), format!("{} bins", n_bins(plan)))
             .also(scenario.particles.count_span, format!("{} particles", plan.particles.count))
-            .found(format!("{per_bin:.3} particles per bin"))
+            .found(format!("{} particles per bin", short(per_bin)))
             .expected(format!("at least {FEW_PER_BIN}"))
-            .help(format!("use at least {needed:e} particles, or at most {affordable} bins in all"))
+            .help(format!("use at least {needed} particles, or at most {affordable} bins in all"))
     };
     if per_bin < TOO_FEW_PER_BIN {
         diagnostics
@@ -162,18 +164,19 @@ fn exchange(scenario: &Scenario, plan: &Plan, limits: &mut Vec<Limit>, diagnosti
         let step = LARGE_EXCHANGE / rate;
         let message = if value > TOO_LARGE_EXCHANGE {
             let title = format!(
-                "step {} s cannot resolve zone `{}`: 1/chi = {:.4} s, allowed {step:.4} s",
-                plan.time.step,
+                "step {} s cannot resolve zone `{}`: 1/chi = {} s, allowed {} s",
+                short(plan.time.step),
                 zone.name,
-                1.0 / rate
+                short(1.0 / rate),
+                short(step)
             );
             Diagnostic::refused(N202, title)
         } else {
             Diagnostic::warning(N102, format!("the step is coarse for zone `{}`", zone.name))
         };
         let mut message = message
-            .at(scenario.run.step_span, format!("chi dt = {value:.3}"))
-            .found(format!("chi dt = {value:.3}"))
+            .at(scenario.run.step_span, format!("chi dt = {}", short(value)))
+            .found(format!("chi dt = {}", short(value)))
             .expected(format!("chi dt <= {LARGE_EXCHANGE}"))
             .help(format!(
                 "use `step {}` or less, or write `rate instant` if the limit is meant",
@@ -190,7 +193,16 @@ fn exchange(scenario: &Scenario, plan: &Plan, limits: &mut Vec<Limit>, diagnosti
 fn round_down(seconds: f64) -> String {
     let scale = 10f64.powi(seconds.log10_floor() - 1);
     let rounded = (seconds / scale * (1.0 + 1e-12)).floor() * scale;
-    format!("{rounded:.3e} s")
+    format!("{} s", number(rounded))
+}
+
+/// Three figures are enough for a message.
+fn short(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return number(value);
+    }
+    let scale = 10f64.powi(value.abs().log10_floor() - 2);
+    number((value / scale).round() * scale)
 }
 
 trait Log10Floor {
@@ -258,7 +270,7 @@ fn numerical_dispersion(
         diagnostics.push(
             message
                 .at(bins_span(scenario), format!("{} bins along {name}", axis.bins))
-                .found(format!("{:.3} of the dispersion coefficient", ratio))
+                .found(format!("{} of the dispersion coefficient", short(ratio)))
                 .expected(format!("at most {VISIBLE_DISPERSION}"))
                 .help(format!("use at least {needed} bins along {name}")),
         );
@@ -286,6 +298,6 @@ fn check_memory(
             .at(scenario.particles.count_span, format!("{:.2} GiB of particles and bins", gib(needed)))
             .found(format!("{:.2} GiB needed", gib(needed)))
             .expected(format!("at most {:.2} GiB", gib(available)))
-            .help(format!("at most {fitting:.3e} particles fit")),
+            .help(format!("at most {fitting} particles fit")),
     );
 }
