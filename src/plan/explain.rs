@@ -136,8 +136,8 @@ fn field_lines(plan: &Plan) -> Vec<String> {
     if names.is_empty() {
         lines.push("positions only".to_owned());
     } else {
-        let plural = if n_values == 1 { "one value" } else { "values" };
-        lines.push(format!("{}: {n_values} {plural} each, beside the position", names.join(", ")));
+        let values = if n_values == 1 { "one value".to_owned() } else { format!("{n_values} values") };
+        lines.push(format!("{}: {values} each, beside the position", names.join(", ")));
     }
     if let Some(mixing) = &plan.mixing {
         for zone in &mixing.zones {
@@ -163,7 +163,11 @@ fn field_lines(plan: &Plan) -> Vec<String> {
         let terms: Vec<String> = species
             .terms
             .iter()
-            .map(|(component, factor)| format!(" + {} {}", number(*factor), plan.components[*component].name))
+            .map(|(component, factor)| {
+                let sign = if *factor < 0.0 { '-' } else { '+' };
+                let size = if factor.abs() == 1.0 { String::new() } else { number(factor.abs()) + " " };
+                format!(" {sign} {size}{}", plan.components[*component].name)
+            })
             .collect();
         lines.push(format!(
             "{} before reaction = {}{}",

@@ -6,7 +6,7 @@ use super::geometry::grid;
 use super::model::species_index;
 use super::{Output, OutputKind};
 use crate::diagnostic::Diagnostic;
-use crate::diagnostic::codes::{M001, M002, M004, U104, U105};
+use crate::diagnostic::codes::{D009, M001, M002, M004, U104, U105};
 use crate::source::{Span, Spanned};
 use crate::syntax::tree;
 use crate::units::{Dimension, Unit};
@@ -227,24 +227,38 @@ fn output_bins(
     if matches!(kind, OutputKind::Total | OutputKind::Particles) {
         return Some(Vec::new());
     }
-    let n_axes = checker.axes.len();
     if !written.grid.is_empty() {
-        let Some(axis) = along.filter(|_| written.grid.len() == 1 && n_axes > 1) else {
+        let Some(axis) = along else {
             return grid(checker, &written.grid, "the bins of the output", place).map(|grid| grid.value);
         };
+        if written.grid.len() != 1 {
+            checker.report(
+                Diagnostic::error(D009, format!("`{}` has bins along one axis", kind.word()))
+                    .at(place, format!("the first of {} counts", written.grid.len()))
+                    .found(format!("{} counts", written.grid.len()))
+                    .expected("one count")
+                    .help("`map` has bins along all axes of the domain"),
+            );
+            return None;
+        }
         let count = checker.count(written.grid[0].value, "the number of bins", 1e8, place)? as usize;
         return Some(checker.axes.iter().map(|(_, index)| if *index == axis { count } else { 1 }).collect());
     }
     let Some(average) = average else {
         // A wrong `average` has been reported already.
         if statements.average.is_none() {
-            checker.report(
-                Diagnostic::error(M001, format!("`{}` needs bins", kind.word()))
+            let message = Diagnostic::error(M001, format!("`{}` needs bins", kind.word())).found("no bins");
+            checker.report(if kind == OutputKind::Mixing {
+                message
+                    .at(written.kind.span, "no `average bins` in the scene")
+                    .expected("one `average` statement")
+                    .help("add for example `average bins 100`")
+            } else {
+                message
                     .at(written.kind.span, "neither `on` here nor `average bins` in the scene")
-                    .found("no bins")
                     .expected("`on` and a number of bins")
-                    .help("add `on 100` to the output, or `average bins 100` to the scene"),
-            );
+                    .help("add `on 100` to the output, or `average bins 100` to the scene")
+            });
         }
         return None;
     };
