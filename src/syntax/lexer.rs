@@ -17,23 +17,26 @@ const SYMBOLS: &[&str] = &[
 pub fn tokenize(file: FileId, text: &str) -> Vec<Token> {
     let mut tokens = Vec::with_capacity(text.len() / 3);
     let mut start = 0;
+    let mut is_beginning = true;
     while start < text.len() {
-        let (kind, n_bytes) = next_token(&text[start..], start == 0);
+        let (kind, n_bytes) = next_token(&text[start..], is_beginning);
+        is_beginning &= matches!(kind, TokenKind::Blank | TokenKind::Newline);
         tokens.push(Token { kind, span: Span::new(file, start, start + n_bytes) });
         start += n_bytes;
     }
     tokens
 }
 
-/// Kind and length of the token that `rest` (not empty) begins with.
-fn next_token(rest: &str, is_file_start: bool) -> (TokenKind, usize) {
+/// Kind and length of the token that `rest` (not empty) begins with; at the beginning of a file only
+/// blanks and line ends stand before it.
+fn next_token(rest: &str, is_beginning: bool) -> (TokenKind, usize) {
     let first = rest.chars().next().unwrap_or('\0');
     match first {
         '\n' => (TokenKind::Newline, 1),
         '\r' => (TokenKind::Newline, if rest.starts_with("\r\n") { 2 } else { 1 }),
         ' ' | '\t' => (TokenKind::Blank, prefix_length(rest, |c| c == ' ' || c == '\t')),
         // A byte order mark is what some editors put first; it means nothing.
-        '\u{feff}' if is_file_start => (TokenKind::Blank, first.len_utf8()),
+        '\u{feff}' if is_beginning => (TokenKind::Blank, first.len_utf8()),
         '#' => (TokenKind::Comment, prefix_length(rest, |c| c != '\n' && c != '\r')),
         '"' => (TokenKind::Text, text_length(rest)),
         '0'..='9' => (TokenKind::Number, number_length(rest)),

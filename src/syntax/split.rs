@@ -37,6 +37,11 @@ impl<'t> Lexed<'t> {
         self.kind(idx).is_some_and(is_significant_kind)
     }
 
+    /// The first significant token at or after `idx`.
+    pub fn next_significant(&self, idx: usize) -> Option<usize> {
+        (idx..self.tokens.len()).find(|&idx| self.is_significant(idx))
+    }
+
     /// The first significant token at or after `idx` that stands before a line end.
     fn next_on_line(&self, idx: usize) -> Option<usize> {
         (idx..self.tokens.len())

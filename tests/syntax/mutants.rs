@@ -50,7 +50,7 @@ fn swap(text: &str, tokens: &[(TokenKind, Range<usize>)], idx: usize) -> Option<
 }
 
 /// Words lose a letter, get one twice, get one more or a wrong one; numbers get a letter inside;
-/// symbols become another one or stand twice.
+/// symbols become another one.
 fn misspellings(text: &str, token: &(TokenKind, Range<usize>)) -> Vec<Mutant> {
     let word = &text[token.1.clone()];
     let middle = word.char_indices().nth(word.chars().count() / 2).map_or(0, |(at, _)| at);
@@ -60,7 +60,7 @@ fn misspellings(text: &str, token: &(TokenKind, Range<usize>)) -> Vec<Mutant> {
         TokenKind::Word => vec![format!("{head}{rest}"), format!("{word}q"), format!("{head}z{rest}")],
         TokenKind::Number => vec![format!("{head}q{tail}"), format!("{word}.")],
         TokenKind::Text => vec![format!("\"{}", word.trim_matches('"')), word.trim_matches('"').to_owned()],
-        _ => vec![format!("{word}{word}"), ";".to_owned(), "?".to_owned()],
+        _ => vec![";".to_owned(), "?".to_owned()],
     };
     let wrong = wrong.into_iter().filter(|it| !it.is_empty());
     let mutants = wrong.map(|wrong| {

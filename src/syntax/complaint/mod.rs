@@ -4,6 +4,11 @@
 //! `words`, `diagnostic`, the symbols of `units`.
 //! It deliberately blames one token per statement: what follows a first mistake is guesswork.
 
+mod expected;
+mod junction;
+
+pub use expected::quoted;
+
 use super::grammar::Rule;
 use super::split::{Chunk, Lexed, track_bracket};
 use super::tree::TokenKind;
@@ -11,6 +16,7 @@ use super::words::{RESERVED_WORDS, clause_words};
 use crate::diagnostic::{Diagnostic, codes, did_you_mean};
 use crate::source::Span;
 use crate::units::is_unit_symbol;
+use expected::{expected_words, join_words, literal, shortened};
 use pest::error::{Error, ErrorVariant, InputLocation};
 
 /// The message for a statement that the grammar refused.
@@ -21,6 +27,10 @@ pub fn complain(lexed: Lexed, chunk: &Chunk, error: &Error<Rule>) -> Diagnostic 
         .or_else(|| stop.misspelt_word())
         .or_else(|| stop.open_bracket())
         .or_else(|| stop.lone_bracket())
+        .or_else(|| stop.lone_branch())
+        .or_else(|| stop.arguments_without_function())
+        .or_else(|| stop.missing_kind())
+        .or_else(|| stop.late_clause())
         .unwrap_or_else(|| stop.plain())
 }
 
@@ -245,134 +255,8 @@ impl<'t> Stop<'t> {
             .help("remove it, or open the bracket where it should begin");
         Some(diagnostic)
     }
-
-    fn plain(&self) -> Diagnostic {
-        let expected = self.expected();
-        let message = match self.at {
-            Some(_) => format!("{} does not fit here", self.found()),
-            None => "this statement ends too early".to_owned(),
-        };
-        let label = match self.at {
-            Some(_) => format!("expected {expected}"),
-            None => format!("after this, expected {expected}"),
-        };
-        let diagnostic = Diagnostic::error(codes::S001, message)
-            .at(self.place(), label)
-            .found(self.found())
-            .expected(expected);
-        match self.help() {
-            Some(help) => diagnostic.help(help),
-            None => diagnostic,
-        }
-    }
-
-    /// What the writer of a token that is at home in other languages will have meant.
-    fn help(&self) -> Option<String> {
-        let at = self.at?;
-        let previous = self.before.last().map_or("", |&idx| self.word(idx));
-        Some(match (previous, self.word(at)) {
-            ("*", "*") => "a power is written `^`".to_owned(),
-            (_, "=") if self.expected.contains(&Rule::infix) => "equality is written `==`".to_owned(),
-            (_, word) if RESERVED_WORDS.contains(&word) && self.expected.contains(&Rule::name) => {
-                format!("`{word}` is a word of the language and cannot be a name")
-            }
-            (before, _) if self.is_after_kind(TokenKind::Number) && self.is_kind(at, TokenKind::Number) => {
-                format!("something is missing between `{}` and this", shortened(before))
-            }
-            _ => return None,
-        })
-    }
-
-    fn is_after_kind(&self, kind: TokenKind) -> bool {
-        self.before.last().is_some_and(|&idx| self.is_kind(idx, kind))
-    }
 }
 
 fn symbol_of(unit: &str) -> &str {
     unit.split(['^', '.', '·']).next().unwrap_or(unit)
-}
-
-/// A token in backticks, shortened where it is long; a text in quotes as it is.
-pub fn quoted(token: &str) -> String {
-    format!("`{}`", shortened(token))
-}
-
-fn shortened(token: &str) -> String {
-    const MAX_SHOWN: usize = 40;
-    let mut shown: String = token.chars().take(MAX_SHOWN).collect();
-    if shown.len() < token.len() {
-        shown.push('…');
-    }
-    shown
-}
-
-fn join_words(words: &[String]) -> String {
-    match words {
-        [] => "something else".to_owned(),
-        [one] => one.clone(),
-        [first @ .., last] => format!("{} or {last}", first.join(", ")),
-    }
-}
-
-/// The word of a keyword's rule.
-fn literal(rule: Rule) -> Option<&'static str> {
-    use Rule as R;
-    Some(match rule {
-        R::kw_zones => "zones",
-        R::kw_frame | R::frame => "frame",
-        R::kw_moving => "moving",
-        R::kw_to => "to",
-        R::kw_step | R::run_step => "step",
-        R::kw_in | R::in_unit => "in",
-        R::kw_at | R::at => "at",
-        R::kw_every | R::every => "every",
-        R::kw_along | R::along => "along",
-        R::kw_on | R::on => "on",
-        R::kw_over | R::over => "over",
-        R::kw_for => "for",
-        R::kw_then => "then",
-        R::kw_else => "else",
-        _ => return None,
-    })
-}
-
-/// What a rule is called in messages; nothing for what would only confuse.
-fn expected_words(rule: Rule) -> Vec<String> {
-    use Rule as R;
-    let one = |word: &str| vec![word.to_owned()];
-    match rule {
-        R::EOI => one("the end of the statement"),
-        R::expression | R::prefix | R::number | R::conditional | R::call | R::path | R::tuple => {
-            one("a value")
-        }
-        R::range => one("a range `low .. high`"),
-        R::infix => one("an operator"),
-        R::name | R::term | R::species_item | R::species_list | R::assignment | R::target => one("a name"),
-        R::reactants | R::products | R::target_kind => one("a name"),
-        R::kind | R::output_kind | R::shape | R::boundary_kind => one("a kind"),
-        R::setting => one("a setting"),
-        R::argument | R::argument_name => one("an argument"),
-        R::label | R::zone => one("a name with `:`"),
-        R::zone_field => one("a field such as `rate`"),
-        R::qualifier | R::placement => one("a further word"),
-        R::text => one("a text in quotes"),
-        R::bare_number | R::count | R::counts => one("a number"),
-        R::unit => one("a unit"),
-        R::axis_name | R::axis => ["`x`", "`y`", "`z`"].map(str::to_owned).to_vec(),
-        R::side => one("a side such as `left`"),
-        R::arrow => one("`->`"),
-        R::rate_sign => one("`@`"),
-        R::dots => one("`..`"),
-        R::times_sign => one("`x`"),
-        R::zone_end | R::comma => one("`,`"),
-        R::colon => one("`:`"),
-        R::plus => one("`+`"),
-        R::assign => one("`=`"),
-        R::open_round => one("`(`"),
-        R::close_round => one("`)`"),
-        R::open_brace => one("`{`"),
-        R::close_brace => one("`}`"),
-        R::kw_t => one("`t`"),
-        _ => literal(rule).map(|word| format!("`{word}`")).into_iter().collect(),
-    }
 }

@@ -1,0 +1,91 @@
+//! Rules and tokens in the user's words.
+//!
+//! Owns what each rule of the grammar is called in a message. May use `grammar`.
+//! It deliberately shows no rule's own name.
+
+use crate::syntax::grammar::Rule;
+
+/// A token in backticks, shortened where it is long; a text in quotes as it is.
+pub fn quoted(token: &str) -> String {
+    format!("`{}`", shortened(token))
+}
+
+pub fn shortened(token: &str) -> String {
+    const MAX_SHOWN: usize = 40;
+    let mut shown: String = token.chars().take(MAX_SHOWN).collect();
+    if shown.len() < token.len() {
+        shown.push('…');
+    }
+    shown
+}
+
+pub fn join_words(words: &[String]) -> String {
+    match words {
+        [] => "something else".to_owned(),
+        [one] => one.clone(),
+        [first @ .., last] => format!("{} or {last}", first.join(", ")),
+    }
+}
+
+/// The word of a keyword's rule.
+pub fn literal(rule: Rule) -> Option<&'static str> {
+    use Rule as R;
+    Some(match rule {
+        R::kw_zones => "zones",
+        R::kw_frame | R::frame => "frame",
+        R::kw_moving => "moving",
+        R::kw_to => "to",
+        R::kw_step | R::run_step => "step",
+        R::kw_in | R::in_unit => "in",
+        R::kw_at | R::at => "at",
+        R::kw_every | R::every => "every",
+        R::kw_along | R::along => "along",
+        R::kw_on | R::on => "on",
+        R::kw_over | R::over => "over",
+        R::kw_for => "for",
+        R::kw_then => "then",
+        R::kw_else => "else",
+        _ => return None,
+    })
+}
+
+/// What a rule is called in messages; nothing for what would only confuse.
+pub fn expected_words(rule: Rule) -> Vec<String> {
+    use Rule as R;
+    let one = |word: &str| vec![word.to_owned()];
+    match rule {
+        R::EOI => one("the end of the statement"),
+        R::expression | R::prefix | R::number | R::conditional | R::call | R::path | R::tuple => {
+            one("a value")
+        }
+        R::range => one("a range `low .. high`"),
+        R::infix => one("an operator"),
+        R::name | R::term | R::species_item | R::species_list | R::assignment | R::target => one("a name"),
+        R::reactants | R::products | R::target_kind => one("a name"),
+        R::kind | R::output_kind | R::shape | R::boundary_kind => one("a kind"),
+        R::setting => one("a setting"),
+        R::argument | R::argument_name => one("an argument"),
+        R::label | R::zone => one("a name with `:`"),
+        R::zone_field => one("a field such as `rate`"),
+        R::qualifier | R::placement => one("a further word"),
+        R::text => one("a text in quotes"),
+        R::bare_number | R::count | R::counts => one("a number"),
+        R::unit => one("a unit"),
+        R::axis_name | R::axis => ["`x`", "`y`", "`z`"].map(str::to_owned).to_vec(),
+        R::side => one("a side such as `left`"),
+        R::arrow => one("`->`"),
+        R::rate_sign => one("`@`"),
+        R::dots => one("`..`"),
+        R::times_sign => one("`x`"),
+        R::zone_end | R::comma => one("`,`"),
+        R::colon => one("`:`"),
+        R::plus => one("`+`"),
+        R::assign => one("`=`"),
+        R::open_round => one("`(`"),
+        R::close_round => one("`)`"),
+        R::open_brace => one("`{`"),
+        R::close_brace => one("`}`"),
+        R::kw_t => one("`t`"),
+        _ => literal(rule).map(|word| format!("`{word}`")).into_iter().collect(),
+    }
+}
