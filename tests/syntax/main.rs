@@ -1,7 +1,7 @@
 //! The syntax as a user meets it: what parses, what is said about what does not, and the layout.
 
+mod expressions;
 mod format;
-mod messages;
 mod mutants;
 mod properties;
 
