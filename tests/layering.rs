@@ -251,10 +251,13 @@ fn every_code_has_a_page_that_explains_it() {
 #[test]
 fn every_code_has_a_fixture() {
     let shown: String = files_below("tests/diagnostics", "txt").iter().map(|path| read(path)).collect();
-    let in_program: String = files_below("tests/cli", "rs").iter().map(|path| read(path)).collect();
+    let of_program = files_below("tests/cli", "rs").into_iter().chain(files_below("src/cli", "rs"));
+    let in_program: String = of_program.map(|path| read(&path)).collect();
     let is_shown = |code: &str| {
-        let is_outside = code.starts_with('F') || code.starts_with('R');
-        shown.contains(&format!("[{code}]")) || (is_outside && in_program.contains(code))
+        let is_outside = code.starts_with(['F', 'R', 'L']);
+        let is_in = |text: &str, code: &str| text.contains(&format!("[{code}]"));
+        let is_named = in_program.contains(&format!("\"{code}\"")) || is_in(&in_program, code);
+        is_in(&shown, code) || (is_outside && is_named)
     };
     let missing = codes::ALL.iter().map(|entry| entry.code.0).filter(|code| !is_shown(code));
     assert_none(missing.map(str::to_owned).collect(), "every code has a fixture under tests/diagnostics:");

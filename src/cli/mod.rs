@@ -8,19 +8,16 @@ mod completions;
 mod explain;
 mod files;
 mod fmt;
-#[allow(dead_code)]
 mod interrupt;
 mod load;
 mod machine;
 mod new;
 mod plan;
-#[allow(dead_code)]
 mod progress;
-#[allow(dead_code)]
+mod record;
+mod run;
 mod summary;
-#[allow(dead_code)]
 mod terminal;
-#[allow(dead_code)]
 mod text;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -75,6 +72,7 @@ enum Command {
     Check(check::Arguments),
     Fmt(fmt::Arguments),
     Plan(plan::Arguments),
+    Run(run::Arguments),
     Explain(explain::Arguments),
     Completions(completions::Arguments),
 }
@@ -112,6 +110,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Check(check) => check::run(check, &terminal),
         Command::Fmt(fmt) => fmt::run(fmt, &terminal),
         Command::Plan(plan) => plan::run(plan, &terminal),
+        Command::Run(run) => run::run(run, &terminal),
         Command::New(new) => new::run(new, &terminal),
         Command::Explain(explain) => explain::run(explain, &terminal),
         Command::Completions(completions) => completions::run(completions, &terminal),

@@ -17,6 +17,7 @@ pub(crate) struct Summary<'a> {
     pub(crate) outcome: &'a Outcome,
     pub(crate) errors: &'a [ErrorRow],
     pub(crate) measures: &'a [Value],
+    pub(crate) n_threads: usize,
     pub(crate) peak_memory: Option<u64>,
     /// Wall seconds of reading and planning, and of writing tables and figure.
     pub(crate) compile_wall: f64,
@@ -41,12 +42,17 @@ impl Summary<'_> {
             ("L1", Align::Right),
             ("L2", Align::Right),
             ("L∞", Align::Right),
+            ("noise", Align::Right),
             ("RMSE", Align::Right),
+            ("unit", Align::Left),
         ];
         let rows: Vec<Vec<String>> = self.errors.iter().take(MAX_ROWS).map(error_cells).collect();
         let rest = self.errors.len().saturating_sub(MAX_ROWS);
         let more = if rest > 0 { format!("… and {rest} rows more in errors/\n") } else { String::new() };
-        format!("errors relative to the reference\n{}{more}", table(&header, &rows))
+        format!(
+            "errors and noise relative to the reference (noise as L2), RMSE in its unit\n{}{more}",
+            table(&header, &rows)
+        )
     }
 
     fn measure_table(&self) -> String {
@@ -82,9 +88,13 @@ impl Summary<'_> {
     fn engine_time(&self) -> String {
         let (wall, cpu) = (duration(self.outcome.wall), duration(self.outcome.cpu));
         match self.ns_per_particle_step() {
-            Some(ns) => format!("{wall} ({cpu} CPU), {ns:.2} ns per particle-step"),
+            Some(ns) => format!("{wall} ({cpu} CPU), {ns:.2} ns per particle-step on {}", self.threads()),
             None => format!("{wall} ({cpu} CPU), no steps"),
         }
+    }
+
+    fn threads(&self) -> String {
+        if self.n_threads == 1 { "1 thread".to_owned() } else { format!("{} threads", self.n_threads) }
     }
 
     fn memory(&self) -> String {
@@ -116,6 +126,7 @@ impl Summary<'_> {
             write_wall: self.write_wall,
             ns_per_particle_step: self.ns_per_particle_step(),
             mass_defect: self.mass_defect(),
+            threads: self.n_threads,
             state_bytes: self.outcome.state_bytes,
             peak_memory: self.peak_memory,
             errors: self.errors.iter().map(JsonError::new).collect(),
@@ -128,14 +139,20 @@ impl Summary<'_> {
 fn error_cells(row: &ErrorRow) -> Vec<String> {
     let time = row.t.map_or("all".to_owned(), |t| format!("{} s", significant_time(t)));
     let mut cells = vec![row.reference.clone(), output_name(row), time];
-    match row.relative {
-        Some(norms) => {
-            let values = [norms.l1, norms.l2, norms.linf, norms.rmse];
-            cells.extend(values.map(|value| significant(value, 3)));
-        }
-        None => cells.extend(std::iter::repeat_n("–".to_owned(), 4)),
-    }
+    let relative = row.relative;
+    let norms =
+        [relative.map(|n| n.l1), relative.map(|n| n.l2), relative.map(|n| n.linf), relative_noise(row)];
+    let shown =
+        |value: Option<f64>| value.filter(|v| v.is_finite()).map_or("–".to_owned(), |v| significant(v, 3));
+    cells.extend(norms.map(shown));
+    cells.extend([significant(row.norms.rmse, 3), row.unit.clone()]);
     cells
+}
+
+/// The noise divided by the same norm of the reference as L2.
+fn relative_noise(row: &ErrorRow) -> Option<f64> {
+    let reference = row.norms.l2 / row.relative?.l2;
+    row.noise.map(|noise| noise / reference)
 }
 
 fn output_name(row: &ErrorRow) -> String {
@@ -163,13 +180,14 @@ struct JsonSummary<'a> {
     write_wall: f64,
     ns_per_particle_step: Option<f64>,
     mass_defect: f64,
+    threads: usize,
     state_bytes: u64,
     peak_memory: Option<u64>,
     errors: Vec<JsonError<'a>>,
     measures: Vec<JsonMeasure<'a>>,
 }
 
-/// Relative norms; null where the reference is zero.
+/// Norms and noise relative to the reference; null where that is zero.
 #[derive(Serialize)]
 struct JsonError<'a> {
     reference: &'a str,
@@ -179,7 +197,10 @@ struct JsonError<'a> {
     l1: Option<f64>,
     l2: Option<f64>,
     linf: Option<f64>,
-    rmse: Option<f64>,
+    noise: Option<f64>,
+    /// Absolute, in `unit`.
+    rmse: f64,
+    unit: &'a str,
 }
 
 impl<'a> JsonError<'a> {
@@ -192,7 +213,9 @@ impl<'a> JsonError<'a> {
             l1: row.relative.map(|norms| norms.l1),
             l2: row.relative.map(|norms| norms.l2),
             linf: row.relative.map(|norms| norms.linf),
-            rmse: row.relative.map(|norms| norms.rmse),
+            noise: relative_noise(row).filter(|noise| noise.is_finite()),
+            rmse: row.norms.rmse,
+            unit: &row.unit,
         }
     }
 }
@@ -256,6 +279,7 @@ mod tests {
             outcome,
             errors,
             measures,
+            n_threads: 2,
             peak_memory: Some(40_000_000),
             compile_wall: 0.01,
             write_wall: 0.05,

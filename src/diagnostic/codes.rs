@@ -61,6 +61,7 @@ codes! {
     R102 "a value of the run is no longer right",
     R103 "the machine cannot give what the run needs",
     R104 "the plan contradicts itself",
+    R105 "a result cannot be compared or measured",
     P001 "the command line sets a parameter that the scene does not have",
     P002 "a parameter lies outside of its range",
     D001 "two parameters of a function have one name",

@@ -1,4 +1,7 @@
 //! The program, run as a user would: each command, each exit code, each way a file can be wrong.
 
 mod basics;
+mod files;
 mod program;
+mod runs;
+mod scenes;

@@ -1,0 +1,260 @@
+//! `lamella run`: a scene, all the way to tables, errors and a figure.
+
+use super::files::{is_stdin, write_whole};
+use super::interrupt::Interrupt;
+use super::load;
+use super::progress::Progress;
+use super::summary::Summary;
+use super::text::{bytes, duration, grouped};
+use super::{CommandResult, Exit, Stopped, Terminal, machine, record};
+use lamella::diagnostic::{Diagnostic, codes};
+use lamella::engine::snapshot::{Outcome, Snapshot, Values};
+use lamella::engine::{self, Control, RunError};
+use lamella::measure::{self, Evaluated};
+use lamella::plan::compile::Compiled;
+use lamella::report;
+use lamella::scenario::Settings;
+use lamella::table::{Record, TableError, Writer};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Run a scene and write its tables
+#[derive(clap::Args)]
+pub(crate) struct Arguments {
+    /// Scene file; `-` is standard input
+    file: PathBuf,
+    /// Folder of the results [default: results/<scene>]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Set a parameter, such as v=2cm/s
+    #[arg(long, value_name = "NAME=VALUE", value_parser = load::parse_setting)]
+    set: Vec<(String, String)>,
+    /// Root of all random numbers, instead of the scene's
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+    /// Threads; the results are the same for any number [default: all cores]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+    /// Draw figure.svg in the folder of the results
+    #[arg(long)]
+    plot: bool,
+    /// Leave nothing out
+    #[arg(long)]
+    no_passes: bool,
+}
+
+impl Arguments {
+    fn folder(&self) -> PathBuf {
+        self.out.clone().unwrap_or_else(|| Path::new("results").join(scene_name(&self.file)))
+    }
+
+    fn n_threads(&self) -> usize {
+        self.threads.map_or_else(machine::n_threads, usize::from)
+    }
+}
+
+/// The file's name without its ending.
+fn scene_name(file: &Path) -> String {
+    if is_stdin(file) {
+        return "stdin".to_owned();
+    }
+    file.file_stem().map_or_else(|| "scene".to_owned(), |stem| stem.to_string_lossy().into_owned())
+}
+
+pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
+    let interrupt = Interrupt::listen();
+    let begin = Instant::now();
+    let settings = Settings { set: arguments.set.clone(), seed: arguments.seed };
+    let mut checked = load::load(&arguments.file, &settings, arguments.no_passes)?;
+    terminal.diagnostics(&checked.diagnostics, &checked.sources);
+    let Some(compiled) = checked.compiled.take() else { return Ok(Exit::SceneWrong) };
+    let compile_wall = begin.elapsed().as_secs_f64();
+    terminal.remark(&announcement(&compiled));
+    if !compiled.left_out.is_empty() {
+        terminal.diagnostics(&[compiled.left_out_note()], &checked.sources);
+    }
+    let job = Job {
+        record: record::record(&checked, &compiled, &scene_name(&arguments.file)),
+        folder: arguments.folder(),
+        n_threads: arguments.n_threads(),
+        wants_figure: arguments.plot,
+        compile_wall,
+        compiled,
+    };
+    job.run(terminal, &interrupt)
+}
+
+/// What is about to happen, in one line.
+fn announcement(compiled: &Compiled) -> String {
+    let plan = &compiled.plan;
+    format!(
+        "{} particles, {} steps, about {} on one core, {} of particles",
+        grouped(plan.particles.count),
+        grouped(plan.time.n_steps),
+        duration(compiled.cost.cpu_seconds),
+        bytes(compiled.cost.state_bytes)
+    )
+}
+
+/// A compiled scene with all that its run needs.
+struct Job {
+    compiled: Compiled,
+    record: Record,
+    folder: PathBuf,
+    n_threads: usize,
+    wants_figure: bool,
+    compile_wall: f64,
+}
+
+/// What a run has found, before anything of it has a name on disk.
+struct Found {
+    outcome: Outcome,
+    snapshots: Vec<Snapshot>,
+    evaluated: Evaluated,
+    started: i64,
+}
+
+impl Job {
+    fn run(&self, terminal: &Terminal, interrupt: &Interrupt) -> CommandResult {
+        let mut writer =
+            Writer::create(&self.folder, &self.compiled.plan, &self.record).map_err(table_failed)?;
+        let found = self.simulate(&mut writer, terminal, interrupt)?;
+        let begin = Instant::now();
+        let figure = self.wants_figure.then(|| {
+            report::figure(&self.compiled.plan, &self.record, &found.snapshots, &found.evaluated.curves)
+        });
+        let errors = report::error_rows(&self.compiled.plan, self.record.n_axes, &found.evaluated.errors);
+        let row = self.point(&found);
+        let written = writer.finish(vec![row], &errors).map_err(table_failed)?;
+        let figure_path = self.folder.join("figure.svg");
+        if let Some(figure) = &figure {
+            write_whole(&figure_path, figure)?;
+        }
+        let measures = record::measures(&found.evaluated);
+        let summary = Summary {
+            folder: &self.folder,
+            figure: figure.is_some().then_some(figure_path.as_path()),
+            plan_hash: &self.compiled.hash,
+            outcome: &found.outcome,
+            errors: &errors,
+            measures: &measures,
+            n_threads: self.n_threads,
+            peak_memory: machine::peak_memory(),
+            compile_wall: self.compile_wall,
+            write_wall: written.write_wall.max(begin.elapsed().as_secs_f64()),
+        };
+        if !terminal.is_quiet() {
+            terminal.product(&if terminal.is_json() { summary.json() } else { summary.text() })?;
+        }
+        Ok(Exit::Done)
+    }
+
+    /// Runs the engine; snapshots go to the writer, and stay here if something is computed from them.
+    fn simulate(
+        &self,
+        writer: &mut Writer,
+        terminal: &Terminal,
+        interrupt: &Interrupt,
+    ) -> Result<Found, Stopped> {
+        let plan = &self.compiled.plan;
+        let started = machine::now();
+        let progress = Progress::new(terminal, plan.particles.count, plan.time.n_steps);
+        let watch = Watch { progress, interrupt };
+        let mut snapshots = Vec::new();
+        let mut refusal = None;
+        let mut sink = |snapshot: Snapshot| {
+            writer.write(&snapshot).map_err(|error| {
+                let text = error.to_string();
+                refusal = Some(error);
+                RunError::Sink(text)
+            })?;
+            if !matches!(snapshot.values, Values::Particles { .. }) {
+                snapshots.push(snapshot);
+            }
+            Ok(())
+        };
+        let settings = engine::Settings { threads: Some(self.n_threads), ..engine::Settings::default() };
+        let outcome = engine::run(plan, &settings, &watch, &mut sink);
+        watch.progress.finish();
+        let outcome = outcome.map_err(|error| refusal.map_or_else(|| run_failed(&error), table_failed))?;
+        let evaluated = measure::evaluate(plan, &self.compiled.evaluation, &snapshots, &outcome)
+            .map_err(|reason| Stopped::new(Exit::Failed, Diagnostic::error(codes::R105, reason)))?;
+        Ok(Found { outcome, snapshots, evaluated, started })
+    }
+
+    fn point(&self, found: &Found) -> lamella::table::PointRow {
+        let errors = report::error_values(&self.compiled.plan, self.record.n_axes, &found.evaluated.errors);
+        let values = errors.into_iter().chain(record::measures(&found.evaluated)).collect();
+        let mut row = record::point(&self.compiled, &found.outcome, values);
+        row.compile_wall = self.compile_wall;
+        row.threads = u32::try_from(self.n_threads).unwrap_or(u32::MAX);
+        row.started = found.started;
+        row
+    }
+}
+
+/// What the engine is watched by.
+struct Watch<'a> {
+    progress: Progress<'a>,
+    interrupt: &'a Interrupt,
+}
+
+impl Control for Watch<'_> {
+    fn step_done(&self, step: u64, _n_steps: u64) {
+        self.progress.step_done(step);
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.interrupt.is_requested()
+    }
+}
+
+fn table_failed(error: TableError) -> Stopped {
+    Stopped::new(Exit::Failed, Diagnostic::error(codes::F103, error.to_string()))
+}
+
+fn run_failed(error: &RunError) -> Stopped {
+    let (exit, code) = match error {
+        RunError::Cancelled => (Exit::Interrupted, codes::R101),
+        RunError::NonFiniteInitial { .. }
+        | RunError::NonFinitePosition { .. }
+        | RunError::NonFiniteConcentration { .. }
+        | RunError::NegativeConcentration { .. }
+        | RunError::MassLost { .. } => (Exit::Failed, codes::R102),
+        RunError::OutOfMemory { .. } | RunError::Threads(_) => (Exit::Failed, codes::R103),
+        RunError::Plan(_) => (Exit::Failed, codes::R104),
+        RunError::Sink(_) => (Exit::Failed, codes::F103),
+    };
+    let message = Diagnostic::error(code, error.to_string());
+    let message = match error {
+        RunError::Cancelled => {
+            message.note("no table was written; the same scene gives the same bytes again")
+        }
+        _ => message,
+    };
+    Stopped::new(exit, message)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_failure_of_a_run_has_its_code_and_exit() {
+        let of = |error: RunError| {
+            let stopped = run_failed(&error);
+            (stopped.message.code.0, stopped.exit)
+        };
+        assert_eq!(of(RunError::Cancelled), ("R101", Exit::Interrupted));
+        assert_eq!(of(RunError::NonFinitePosition { step: 1, particle: 2 }), ("R102", Exit::Failed));
+        assert_eq!(of(RunError::OutOfMemory { bytes: 1 }), ("R103", Exit::Failed));
+        assert_eq!(of(RunError::Plan("two".to_owned())), ("R104", Exit::Failed));
+        assert_eq!(of(RunError::Sink("full".to_owned())), ("F103", Exit::Failed));
+    }
+
+    #[test]
+    fn results_are_named_by_the_scene() {
+        assert_eq!(scene_name(Path::new("a/b.c.lam")), "b.c");
+        assert_eq!(scene_name(Path::new("-")), "stdin");
+    }
+}

@@ -1,0 +1,180 @@
+//! `run`: results whole or absent, the same bytes every time.
+
+use crate::program::{Finished, Folder, finish};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// A scene that runs in well under a second.
+const SMALL: &str = r#"lamella 1
+param c0 = 0.02 mol/L
+param D  = 1.3e-3 cm^2/s
+species A, B, AB
+reaction join: A + B -> AB @ instant
+domain line x = -7.5 cm .. 7.5 cm
+boundary left, right reflect
+dispersion D
+mixing zones {
+  fast: fraction 0.5, rate instant
+  slow: fraction 0.5, rate 1e-3 /s
+}
+average bins 60
+initial A = if x < 0 cm then c0 else 0
+initial B = c0 - A
+particles fluid 20_000 stratified
+run to 100 s, step 2 s
+seed 42
+output profile    A, B, AB at t = 50 s, 100 s
+output covariance A, B     at t = 50 s, 100 s
+output total      AB every 10 s
+output mixing     A, B every 10 s
+output particles  A, AB at t = 100 s
+reference well_mixed for AB = 0.5 * c0 * erfc(abs(x) / (2*sqrt(D*t)))
+"#;
+
+fn run(folder: &Folder, arguments: &[&str]) -> Finished {
+    folder.lamella(&[&["run", "small.lam"], arguments].concat())
+}
+
+fn with_small() -> Folder {
+    let folder = Folder::new();
+    folder.write("small.lam", SMALL);
+    folder
+}
+
+/// The data files of a results folder; facts of the machine live in `points.parquet` alone.
+fn data_files(folder: &Folder, out: &str) -> Vec<String> {
+    let inside = format!("{out}/");
+    let names = folder.files().into_iter().filter_map(|name| name.strip_prefix(&inside).map(str::to_owned));
+    names.filter(|name| name != "points.parquet").collect()
+}
+
+#[track_caller]
+fn assert_same_bytes(folder: &Folder, a: &str, b: &str) {
+    let names = data_files(folder, a);
+    assert!(names.iter().filter(|name| name.ends_with(".parquet")).count() >= 6, "{names:?}");
+    assert_eq!(names, data_files(folder, b));
+    for name in names {
+        let bytes =
+            |out: &str| std::fs::read(folder.path(&format!("{out}/{name}"))).expect("the file is there");
+        assert!(bytes(a) == bytes(b), "{name} differs between {a} and {b}");
+    }
+}
+
+#[test]
+fn a_run_writes_the_layout_of_the_readme() {
+    let folder = with_small();
+    let finished = run(&folder, &["--plot"]).exits(0).says("note[L010]: left out of this run");
+    let files = folder.files();
+    for name in ["plan.yaml", "points.parquet", "columns.parquet", "profile/part-0000.parquet", "figure.svg"]
+    {
+        assert!(files.contains(&format!("results/small/{name}")), "{name} in {files:?}");
+    }
+    for part in ["well_mixed", "mass defect", "ns per particle-step", "results/small"] {
+        assert!(finished.stdout.contains(part), "{part} in {}", finished.stdout);
+    }
+}
+
+#[test]
+fn any_number_of_threads_and_any_repetition_give_the_same_bytes() {
+    let folder = with_small();
+    for (threads, out) in [("1", "one"), ("2", "two"), ("7", "seven"), ("1", "again")] {
+        run(&folder, &["--threads", threads, "--out", out, "--quiet"]).exits(0);
+    }
+    for out in ["two", "seven", "again"] {
+        assert_same_bytes(&folder, "one", out);
+    }
+}
+
+#[test]
+fn formatting_changes_neither_hash_nor_data() {
+    let folder = with_small();
+    run(&folder, &["--out", "before", "-q"]).exits(0);
+    folder.lamella(&["fmt", "small.lam"]).exits(0);
+    run(&folder, &["--out", "after", "-q"]).exits(0);
+    let hash = |out: &str| {
+        let plan = folder.read(&format!("{out}/plan.yaml"));
+        plan.lines().find(|line| line.contains("hash")).expect("plan.yaml has a hash").to_owned()
+    };
+    assert_eq!(hash("before"), hash("after"));
+}
+
+#[test]
+fn another_seed_gives_other_numbers() {
+    let folder = with_small();
+    run(&folder, &["--out", "a", "-q"]).exits(0);
+    run(&folder, &["--out", "b", "-q", "--seed", "43"]).exits(0);
+    let bytes =
+        |out: &str| std::fs::read(folder.path(&format!("{out}/profile/part-0000.parquet"))).expect("there");
+    assert!(bytes("a") != bytes("b"));
+}
+
+#[test]
+fn a_second_run_replaces_the_first() {
+    let folder = with_small();
+    run(&folder, &["-q"]).exits(0);
+    let first = folder.files();
+    run(&folder, &["-q"]).exits(0);
+    assert_eq!(folder.files(), first);
+}
+
+#[test]
+fn a_wrong_scene_does_not_start() {
+    let folder = Folder::new();
+    folder.write("small.lam", SMALL.replace("dispersion D", "dispersion 3 kg"));
+    run(&folder, &[]).exits(2).says("small.lam:8:");
+    assert_eq!(folder.files(), ["small.lam"]);
+}
+
+#[test]
+fn a_run_that_breaks_names_the_particle_and_leaves_no_table() {
+    let folder = Folder::new();
+    // An odd number of ordered particles puts one at exactly 0, where this has no value.
+    let text = SMALL
+        .replace("if x < 0 cm then c0 else 0", "c0 * (1 cm / abs(x))")
+        .replace("initial B = c0 - A", "initial B = c0");
+    folder.write("small.lam", text.replace("20_000 stratified", "20_001 ordered"));
+    run(&folder, &[]).exits(1).says("[R102]").says("particle 10000");
+    assert!(folder.files().iter().all(|name| !name.contains("part-")), "{:?}", folder.files());
+}
+
+#[test]
+fn a_summary_as_json_has_the_numbers() {
+    let folder = with_small();
+    let finished = run(&folder, &["--message-format", "json"]).exits(0);
+    let summary: serde_json::Value = serde_json::from_str(&finished.stdout).expect("one JSON object");
+    assert_eq!(summary["particles"], 20_000);
+    assert_eq!(summary["steps"], 50);
+    assert!(summary["mass_defect"].as_f64().is_some_and(|defect| defect <= 1e-12), "{summary}");
+    assert_eq!(summary["errors"][0]["reference"], "well_mixed");
+    finished.messages();
+}
+
+#[test]
+fn a_column_that_nothing_reads_is_left_out_without_passes_it_is_not() {
+    let folder = with_small();
+    run(&folder, &["--out", "with", "-q"]).exits(0);
+    run(&folder, &["--out", "without", "-q", "--no-passes"]).exits(0);
+    let bytes =
+        |out: &str| std::fs::read(folder.path(&format!("{out}/mixing/part-0000.parquet"))).expect("there");
+    assert_eq!(bytes("with").len(), bytes("without").len());
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_run_leaves_no_half_file_and_exits_130() {
+    for signal in ["INT", "TERM"] {
+        let folder = Folder::new();
+        folder.write("long.lam", SMALL.replace("20_000", "200_000").replace("step 2 s", "step 0.001 s"));
+        let mut command = folder.command(&["run", "long.lam"]);
+        let child =
+            command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("the program starts");
+        std::thread::sleep(Duration::from_millis(1500));
+        let started = Instant::now();
+        let kill = Command::new("kill").args([format!("-{signal}"), child.id().to_string()]).status();
+        assert!(kill.is_ok_and(|status| status.success()), "the run was still going");
+        let finished = finish(child.wait_with_output().expect("the program ends")).exits(130).says("[R101]");
+        assert!(started.elapsed() < Duration::from_secs(5), "{}", finished.stderr);
+        let left: Vec<String> = folder.files().into_iter().filter(|name| name != "long.lam").collect();
+        assert!(left.is_empty(), "{left:?}");
+    }
+}
