@@ -2,8 +2,9 @@
 //!
 //! Each `tests/diagnostics/<phase>/<the_mistake>.lam` has its rendered messages beside it in a `.txt`.
 //! A line `# expect: U104 D001` demands these codes; a line `# set: name=value` is what `--set` would
-//! do; `# memory: 1000` is a machine of so many bytes. `LAMELLA_BLESS=1` (`make bless`) writes the
-//! messages anew; look at the difference before you commit it.
+//! do; `# memory: 1000` is a machine of so many bytes; `# left out` asks for the note of what the run
+//! does without. `LAMELLA_BLESS=1` (`make bless`) writes the messages anew; look at the difference
+//! before you commit it.
 
 use lamella::diagnostic::Diagnostic;
 use lamella::diagnostic::render::{self, Colour};
@@ -50,7 +51,11 @@ fn check(path: &Path) -> (Vec<Diagnostic>, Sources) {
     let options = Options { memory, ..Options::default() };
     let settings = Settings { set: set.collect(), ..Settings::default() };
     let checked = lamella::check(Sources::single(name(path), text.clone()), &settings, &options);
-    (checked.diagnostics, checked.sources)
+    let mut diagnostics = checked.diagnostics;
+    if directives(&text, "# left out").next().is_some() {
+        diagnostics.extend(checked.compiled.as_ref().map(|compiled| compiled.left_out_note()));
+    }
+    (diagnostics, checked.sources)
 }
 
 /// What follows a mark at the start of a line.
