@@ -8,7 +8,7 @@ use super::observed::column;
 use crate::catalog;
 use crate::plan::Output;
 use crate::plan::evaluation::{Evaluation, Reference, Solution};
-use crate::plan::tape::{Operation, Tape};
+use crate::plan::tape::Tape;
 
 /// A reference with its solution built.
 pub(super) struct Prepared<'a> {
@@ -33,7 +33,11 @@ impl<'a> Prepared<'a> {
 
     fn new(idx: usize, reference: &'a Reference) -> Result<Self, String> {
         let solution = match &reference.solution {
-            Solution::Expression(tape) => Built::Expression(tape),
+            Solution::Expression(tape) => {
+                // x, y, z and t.
+                tape.check(4).map_err(|reason| format!("Reference `{}`: {reason}.", reference.name))?;
+                Built::Expression(tape)
+            }
             Solution::Catalogue { name, arguments } => {
                 let item = catalog::reference::find(name)
                     .ok_or_else(|| format!("There is no reference `{name}` in the catalogue."))?;
@@ -53,11 +57,9 @@ impl<'a> Prepared<'a> {
         let mut out = vec![0.0; positions[0].len()];
         match &self.solution {
             Built::Expression(tape) => {
-                let mut registers = Vec::with_capacity(tape.operations.len());
-                for (idx, value) in out.iter_mut().enumerate() {
-                    let inputs = [positions[0][idx], positions[1][idx], positions[2][idx], t];
-                    *value = run_tape(tape, inputs, &mut registers);
-                }
+                let time = vec![t; out.len()];
+                let inputs = [&positions[0][..], &positions[1], &positions[2], &time];
+                tape.evaluate_block(&inputs, &mut Vec::new(), &mut out);
             }
             Built::Catalogue(solution) => {
                 solution.fill(t, [&positions[0], &positions[1], &positions[2]], &mut out);
@@ -114,23 +116,4 @@ fn points(grid: &Grid, rules: &[Rule], bins: std::ops::Range<usize>, per_bin: us
         }
     }
     positions
-}
-
-/// The value of a tape at one point.
-fn run_tape(tape: &Tape, inputs: [f64; 4], registers: &mut Vec<f64>) -> f64 {
-    registers.clear();
-    for operation in &tape.operations {
-        let at = |register: u16| registers[usize::from(register)];
-        let value = match *operation {
-            Operation::Constant(value) => value,
-            Operation::Input(column) => inputs[usize::from(column)],
-            Operation::Unary(operator, a) => operator.apply(at(a)),
-            Operation::Binary(operator, a, b) => operator.apply(at(a), at(b)),
-            Operation::Select(condition, then, otherwise) => {
-                at(if at(condition) != 0.0 { then } else { otherwise })
-            }
-        };
-        registers.push(value);
-    }
-    registers.last().copied().unwrap_or(f64::NAN)
 }

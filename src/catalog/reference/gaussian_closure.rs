@@ -11,6 +11,7 @@ pub(super) const ITEM: Item = Item {
     name: "gaussian_closure",
     predicts: Predicts::Concentration,
     arguments: ARGUMENTS,
+    equation: "c = c0/2 − √(2Σ/π) exp(−y²/2Σ) − y erf(y/√(2Σ)), y = c0/2 − ū, Σ = −Σ_AB",
     summary: "product of A + B -> AB at a step front, closed by a normal distribution: an Eulerian model, \
               3 to 14 % above the limit that particles converge to (`front_limit`)",
     source: "Sole-Mari et al. 2020, doi:10.1002/essoar.10501517.1, Gaussian closure (sign of the mean corrected)",

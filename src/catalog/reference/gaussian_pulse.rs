@@ -8,6 +8,7 @@ pub(super) const ITEM: Item = Item {
     name: "gaussian_pulse",
     predicts: Predicts::Concentration,
     arguments: ARGUMENTS,
+    equation: "c = c0 Π_i (w_i / σ_i) exp(−(x_i − x0_i − v_i t)² / (2 σ_i²)), σ_i² = w_i² + 2 D_i t",
     summary: "a pulse of peak `c0` and standard deviation `width` at time 0 that moves and spreads; \
               with `width_y` and `width_z` it is bounded along y and z, too",
     source: "Crank 1975, The Mathematics of Diffusion, section 3.2 (product of one-dimensional pulses)",

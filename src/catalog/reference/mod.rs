@@ -11,6 +11,8 @@ mod front_limit;
 mod gaussian_closure;
 mod gaussian_pulse;
 mod inflow;
+#[cfg(test)]
+mod manual;
 mod pulse_covariance;
 mod pulse_gamma;
 mod solutions;
@@ -86,6 +88,8 @@ pub struct Item {
     pub name: &'static str,
     pub predicts: Predicts,
     pub arguments: &'static [Argument],
+    /// As in the item's own documentation; docs/references.md shows it.
+    pub equation: &'static str,
     /// One line for the language reference.
     pub summary: &'static str,
     /// Author, year, equation, DOI.

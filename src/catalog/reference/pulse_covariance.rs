@@ -10,6 +10,7 @@ pub(super) const ITEM: Item = Item {
     name: "pulse_covariance",
     predicts: Predicts::Covariance,
     arguments: ARGUMENTS,
+    equation: "Σ_AA = η² ∫₀ᵗ e^(−χ(t−s)) [2D (∂c̄/∂x)²(·, s) ∗ N(0, 2D (t − s))](x) ds",
     summary: "covariance of A with itself in a normal pulse along x, one slow mixing zone",
     source: "Sole-Mari et al. 2020, doi:10.1002/essoar.10501517.1, covariance equation, integrated over its sources",
     build,

@@ -10,6 +10,7 @@ pub(super) const ITEM: Item = Item {
     name: "pulse_gamma",
     predicts: Predicts::Gamma,
     arguments: ARGUMENTS,
+    equation: "γ_AA = η² [f(√(χt₀)) √(1 + t/t₀) e^(−χt) − f(√(χ(t + t₀)))], f(u) = 1 − 2u F(u), t₀ = width²/(2D)",
     summary: "gamma of A with itself for a normal pulse along x, one slow mixing zone",
     source: "Sole-Mari et al. 2020, doi:10.1002/essoar.10501517.1, gamma of the dual-rate Gaussian pulse",
     build,

@@ -10,6 +10,7 @@ pub(super) const ITEM: Item = Item {
     name: "step_front",
     predicts: Predicts::Concentration,
     arguments: ARGUMENTS,
+    equation: "c = right + ½ (c0 − right) erfc((x − x0 − v t) / (2 √(D t)))",
     summary: "a step that is `c0` left of `x0` and `right` beyond it at time 0, spreading by dispersion",
     source: "Crank 1975, The Mathematics of Diffusion, eq. 2.14",
     build,

@@ -25,6 +25,7 @@ pub(super) const FRONT: Item = Item {
     name: "front_limit",
     predicts: Predicts::Concentration,
     arguments: FRONT_ARGUMENTS,
+    equation: "c = E[min(U, c0 − U)], U = (1 − η) ū + η W, dW = −(χ/2) (W − ū(X, t)) dt along Brownian paths X",
     summary: "product of A + B -> AB, instant, at a step front with one slow mixing zone: \
               the limit of infinitely many particles, to 1e-5 of `c0`",
     source: "derived from the particle model of Sole-Mari et al. 2020, doi:10.1002/essoar.10501517.1; \
@@ -36,6 +37,7 @@ pub(super) const TOTAL: Item = Item {
     name: "front_total",
     predicts: Predicts::Total,
     arguments: TOTAL_ARGUMENTS,
+    equation: "M = width · depth · ∫ c dx, c as in `front_limit`",
     summary: "amount of product at a step front with one slow mixing zone: the integral of `front_limit`",
     source: "derived from the particle model of Sole-Mari et al. 2020, doi:10.1002/essoar.10501517.1; \
              docs/references.md",
