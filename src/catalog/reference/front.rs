@@ -19,7 +19,7 @@ impl Front {
     /// Equation: `ξ = (x − x0 − v t) / (2 √(D t))`.
     /// Symbols: x position, x0 start, v velocity, D dispersion, t time.
     /// Dimensions and range: none; any real number, infinite beside a front that has not spread.
-    /// Source: Crank 1975, The Mathematics of Diffusion, section 2.2.
+    /// Source: Crank 1975, The Mathematics of Diffusion, chapter 2.
     /// Shape: linear in x, flattening with √t.
     pub(super) fn similarity(self, x: f64, t: f64) -> f64 {
         let distance = x - self.x0 - self.velocity * t.max(0.0);

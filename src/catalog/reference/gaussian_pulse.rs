@@ -11,7 +11,7 @@ pub(super) const ITEM: Item = Item {
     equation: "c = c0 Π_i (w_i / σ_i) exp(−(x_i − x0_i − v_i t)² / (2 σ_i²)), σ_i² = w_i² + 2 D_i t",
     summary: "a pulse of peak `c0` and standard deviation `width` at time 0 that moves and spreads; \
               with `width_y` and `width_z` it is bounded along y and z, too",
-    source: "Crank 1975, The Mathematics of Diffusion, section 3.2 (product of one-dimensional pulses)",
+    source: "Crank 1975, The Mathematics of Diffusion, chapter 2; product of one-dimensional pulses",
     build,
 };
 
@@ -38,7 +38,7 @@ const ARGUMENTS: &[Argument; 13] = &[
 /// Equation: `c = c0 Π_i (w_i / σ_i) exp(−(x_i − x0_i − v_i t)² / (2 σ_i²))`, `σ_i² = w_i² + 2 D_i t`.
 /// Symbols: w_i initial standard deviation, D_i dispersion and v_i velocity along axis i, c0 initial peak.
 /// Dimensions and range: concentration; 0 to c0.
-/// Source: Crank 1975, The Mathematics of Diffusion, section 3.2.
+/// Source: Crank 1975, The Mathematics of Diffusion, chapter 2; product of one-dimensional pulses.
 /// Shape: a bell along every axis that has a width, uniform along the others.
 fn build(values: &[f64]) -> Built {
     let [c0, width, d, x0, v, width_y, d_y, y0, v_y, width_z, d_z, z0, v_z] = checked(ARGUMENTS, values)?;

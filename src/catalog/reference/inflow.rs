@@ -12,7 +12,7 @@ pub(super) const OGATA_BANKS: Item = Item {
     arguments: ARGUMENTS,
     equation: "c = ½ inlet [erfc(ξ₋) + exp(v x/D) erfc(ξ₊)], ξ∓ = (x ∓ v t) / (2 √(D t))",
     summary: "flow into a clean half-space x > x0 whose boundary keeps the concentration `inlet`",
-    source: "Ogata & Banks 1961, USGS Professional Paper 411-A, eq. 13",
+    source: "Ogata & Banks 1961, USGS Professional Paper 411-A",
     build: build_ogata_banks,
 };
 
