@@ -167,3 +167,23 @@ fn every_kind_of_output_and_none_can_be_drawn() {
     plan.outputs.clear();
     assert!(figure(&plan, &common::record(), &[], &[]).contains("no output that can be drawn"));
 }
+
+#[test]
+fn values_out_of_all_bounds_are_drawn_without_panic() {
+    let (plan, mut snapshots, mut curves) = column();
+    let hostile = [f64::NAN, f64::INFINITY, f64::MAX, f64::MIN, -0.0, 5e-324, 1e-300];
+    for (k, value) in hostile.into_iter().enumerate() {
+        for snapshot in &mut snapshots {
+            match &mut snapshot.values {
+                Values::Binned { mean, .. } => mean[0][k] = value,
+                Values::Covariance { covariance, .. } => covariance[0].fill(value),
+                Values::Total { amount } => amount[0] = value,
+                Values::Mixing(states) => states[0].gamma = value,
+                Values::Particles { .. } => {}
+            }
+        }
+        curves.iter_mut().for_each(|curve| curve.y[k] = value);
+        let svg = figure(&plan, &record(), &snapshots, &curves);
+        assert!(svg.trim_end().ends_with("</svg>"));
+    }
+}

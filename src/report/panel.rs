@@ -55,6 +55,12 @@ pub struct Frame {
 }
 
 impl Frame {
+    /// Whether a place lies inside, or not far outside; false for what is no number.
+    fn reaches(&self, at: (f64, f64)) -> bool {
+        let is_near = |place: f64, low: f64, high: f64| place > 2.0 * low - high && place < 2.0 * high - low;
+        is_near(at.0, self.left, self.right) && is_near(at.1, self.top, self.bottom)
+    }
+
     pub fn place(&self, x: &Scale, y: &Scale, point: (f64, f64)) -> (f64, f64) {
         (
             self.left + x.fraction(point.0) * (self.right - self.left),
@@ -130,7 +136,7 @@ fn grid(canvas: &mut Canvas, panel: &Panel, ticks: &Ticks, frame: Frame) {
 
 fn draw_mark(canvas: &mut Canvas, panel: &Panel, mark: &Mark, frame: Frame) {
     let place = |point: &(f64, f64)| frame.place(&panel.x, &panel.y, *point);
-    let is_drawable = |point: &(f64, f64)| point.0.is_finite() && point.1.is_finite();
+    let is_drawable = |point: &(f64, f64)| frame.reaches(*point);
     match mark.look {
         Look::Dots => {
             // Many dots shine through, so that their density shows; few are larger and full.

@@ -10,6 +10,10 @@ pub enum Spacing {
     Log,
 }
 
+/// Beyond these, sums and ratios of values leave the range of numbers; such values are not shown.
+const LARGEST: f64 = 1e300;
+const SMALLEST: f64 = 1e-290;
+
 /// A range of values with its spacing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scale {
@@ -22,19 +26,23 @@ impl Scale {
     /// Covers the values with a margin; zero is kept as an end if the values reach it. Log spacing
     /// if asked for and possible.
     pub fn covering(values: impl Iterator<Item = f64>, spacing: Spacing) -> Self {
-        let is_usable = |value: &f64| value.is_finite() && (spacing == Spacing::Linear || *value > 0.0);
+        let is_usable =
+            |value: &f64| value.abs() <= LARGEST && (spacing == Spacing::Linear || *value > SMALLEST);
         let ends = values.filter(is_usable).fold(None, |ends: Option<(f64, f64)>, value| {
             Some(ends.map_or((value, value), |(low, high)| (low.min(value), high.max(value))))
         });
         match (ends, spacing) {
             (None, _) => Self { low: 0.0, high: 1.0, spacing: Spacing::Linear },
             (Some((low, high)), Spacing::Log) => Self { low: low / 1.15, high: high * 1.15, spacing },
-            (Some((low, high)), Spacing::Linear) => Self::padded(low, high),
+            (Some((low, high)), Spacing::Linear) if high - low > SMALLEST || high.abs() > SMALLEST => {
+                Self::padded(low, high)
+            }
+            (Some(_), Spacing::Linear) => Self { low: 0.0, high: 1.0, spacing },
         }
     }
 
     fn padded(low: f64, high: f64) -> Self {
-        let span = if high > low { high - low } else { high.abs().max(1e-300) };
+        let span = if high > low { high - low } else { high.abs() };
         // Noise below zero of less than a fiftieth of the range does not move the end from zero by more.
         let low = if low >= 0.0 && low < 0.5 * high { 0.0 } else { low - 0.06 * span };
         let high = if high <= 0.0 && high > 0.5 * low { 0.0 } else { high + 0.06 * span };
@@ -82,7 +90,7 @@ fn linear_ticks(low: f64, high: f64, wanted: usize) -> Vec<(f64, String)> {
     let (first, last) = ((low / step - 1e-9).ceil() as i64, (high / step + 1e-9).floor() as i64);
     let step_exponent = if multiple == 10.0 { exponent + 1 } else { exponent };
     let largest = low.abs().max(high.abs());
-    (first..=last.min(first + 50))
+    (first..=last.min(first.saturating_add(50)))
         .map(|k| (k as f64 * step, number(k as f64 * step, step_exponent, largest)))
         .collect()
 }
