@@ -256,8 +256,8 @@ impl Clauses {
         let (rule, span) = (pair.as_rule(), keyword_span(place, &pair));
         let mut inner = Parts::of(place, pair);
         match rule {
-            Rule::at => self.times.set("times", span, Times::List(inner.expressions()?)),
-            Rule::every => self.times.set("times", span, Times::Every(inner.expression()?)),
+            Rule::at => self.times.set("at` or `every", span, Times::List(inner.expressions()?)),
+            Rule::every => self.times.set("at` or `every", span, Times::Every(inner.expression()?)),
             Rule::along => self.along.set("along", span, spanned(place, &inner.need(Rule::axis_name)?)),
             Rule::on => self.on.set("on", span, counts(&mut inner)?),
             Rule::in_unit => self.unit.set("in", span, spanned(place, &inner.need(Rule::unit)?)),

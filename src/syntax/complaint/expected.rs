@@ -5,6 +5,11 @@
 
 use crate::syntax::grammar::Rule;
 
+/// What any expression is called.
+pub const VALUE: &str = "a value";
+/// What follows the last token of a statement.
+pub const END: &str = "the end of the statement";
+
 /// A token in backticks, shortened where it is long; a text in quotes as it is.
 pub fn quoted(token: &str) -> String {
     format!("`{}`", shortened(token))
@@ -54,10 +59,8 @@ pub fn expected_words(rule: Rule) -> Vec<String> {
     use Rule as R;
     let one = |word: &str| vec![word.to_owned()];
     match rule {
-        R::EOI => one("the end of the statement"),
-        R::expression | R::prefix | R::number | R::conditional | R::call | R::path | R::tuple => {
-            one("a value")
-        }
+        R::EOI => one(END),
+        R::expression | R::prefix | R::number | R::conditional | R::call | R::path | R::tuple => one(VALUE),
         R::range => one("a range `low .. high`"),
         R::infix => one("an operator"),
         R::name | R::term | R::species_item | R::species_list | R::assignment | R::target => one("a name"),

@@ -16,7 +16,7 @@ use super::words::{RESERVED_WORDS, clause_words};
 use crate::diagnostic::{Diagnostic, codes, did_you_mean};
 use crate::source::Span;
 use crate::units::is_unit_symbol;
-use expected::{expected_words, join_words, literal, shortened};
+use expected::{END, VALUE, expected_words, join_words, literal, shortened};
 use pest::error::{Error, ErrorVariant, InputLocation};
 
 /// The message for a statement that the grammar refused.
@@ -68,6 +68,12 @@ impl<'t> Stop<'t> {
         self.lexed.tokens[idx].span
     }
 
+    /// Whether the stop lies on a later line than the token before it.
+    fn begins_line(&self, at: usize) -> bool {
+        let before = self.before.last().copied().unwrap_or(0);
+        (before..at).any(|idx| self.is_kind(idx, TokenKind::Newline))
+    }
+
     /// The token that the statement begins with.
     fn keyword(&self) -> &'t str {
         self.before.first().or(self.at.as_ref()).map_or("", |&idx| self.word(idx))
@@ -86,12 +92,21 @@ impl<'t> Stop<'t> {
         self.at.map_or_else(|| "the end of the statement".to_owned(), |idx| quoted(self.word(idx)))
     }
 
+    /// What could follow, each once; what makes up a value is not listed beside it.
     fn expected(&self) -> String {
-        let mut words: Vec<String> = self.expected.iter().flat_map(|rule| expected_words(*rule)).collect();
-        words.dedup();
-        let mut seen = std::collections::BTreeSet::new();
-        words.retain(|word| seen.insert(word.clone()));
-        join_words(&words)
+        let words: Vec<String> = self.expected.iter().flat_map(|rule| expected_words(*rule)).collect();
+        let has_value = words.iter().any(|word| word == VALUE);
+        let mut shown: Vec<String> = Vec::new();
+        for word in words {
+            let is_part = has_value && matches!(word.as_str(), "a number" | "a name" | "`(`");
+            if !is_part && word != END && !shown.contains(&word) {
+                shown.push(word);
+            }
+        }
+        if self.expected.contains(&Rule::EOI) {
+            shown.push(END.to_owned());
+        }
+        join_words(&shown)
     }
 
     /// `.5`, `1.`: numbers have digits on both sides of the point.
@@ -132,7 +147,8 @@ impl<'t> Stop<'t> {
                 .also(self.span(at), "so this does not fit");
             return Some(diagnostic);
         }
-        if !self.is_kind(at, TokenKind::Word) || RESERVED_WORDS.contains(&self.word(at)) {
+        let is_word = self.is_kind(at, TokenKind::Word) && !RESERVED_WORDS.contains(&self.word(at));
+        if !is_word || self.begins_line(at) {
             return None;
         }
         if self.suggestion(self.word(at)).is_some() {
@@ -203,7 +219,9 @@ impl<'t> Stop<'t> {
             _ => None,
         })?;
         let at_end = self.at.is_none_or(|idx| {
-            RESERVED_WORDS.contains(&self.word(idx)) || matches!(self.word(idx), ")" | "}" | "]")
+            (closer == ")" && self.begins_line(idx))
+                || RESERVED_WORDS.contains(&self.word(idx))
+                || matches!(self.word(idx), ")" | "}" | "]")
         });
         let opener = *self.open_brackets().last()?;
         if !at_end {
