@@ -3,9 +3,9 @@
 //! Owns sums over all particles and their defect. May use `state`. It deliberately multiplies by no
 //! volume: all particles have the same.
 
+use super::parallel;
 use super::program::{Program, Role};
 use crate::state::particles::{Block, CHUNK};
-use rayon::prelude::*;
 
 /// Sums of one column.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,10 +48,9 @@ impl Amount {
 
 /// Amounts per column, added in the order of blocks.
 pub fn amounts<const D: usize>(blocks: &[Block<D>], n_columns: usize) -> Vec<Amount> {
-    let partial: Vec<Vec<Amount>> = blocks
-        .par_iter()
-        .map(|block| block.columns.iter().map(|column| Amount::of(column)).collect())
-        .collect();
+    let of_block =
+        |idx: usize| -> Vec<Amount> { blocks[idx].columns.iter().map(|c| Amount::of(c)).collect() };
+    let partial = parallel::map(blocks.len(), &of_block);
     let mut amounts = vec![Amount::NONE; n_columns];
     for block in partial {
         amounts.iter_mut().zip(block).for_each(|(amount, part)| *amount = amount.add(part));

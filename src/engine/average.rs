@@ -8,7 +8,7 @@ use crate::state::particles::BLOCK;
 use std::ops::Range;
 
 /// Most groups of blocks that have sums of their own.
-const MAX_GROUPS: usize = 64;
+const MAX_GROUPS: usize = 32;
 
 /// Most bytes of all partial sums together, if the state is not smaller.
 const MAX_BYTES: u64 = 64 << 20;
@@ -55,11 +55,15 @@ fn accumulate_fixed<const C: usize, const S: usize, const L: usize>(
     sums: &mut [f64],
 ) {
     let (sums, _) = sums.as_chunks_mut::<S>();
+    let columns = columns.map(|column| &column[..slots.len()]);
     for (idx, &slot) in slots.iter().enumerate() {
         let sum = &mut sums[slot as usize * L + idx % L];
-        sum[0] += 1.0;
+        let mut particle = [1.0; S];
         for column in 0..C {
-            sum[column + 1] += columns[column][idx];
+            particle[column + 1] = columns[column][idx];
+        }
+        for place in 0..S {
+            sum[place] += particle[place];
         }
     }
 }

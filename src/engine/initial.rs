@@ -4,10 +4,10 @@
 //! time 0 every stored zone has the value of the expression.
 
 use super::error::RunError;
+use super::parallel;
 use super::place::{Strata, place};
 use super::program::Program;
 use crate::state::particles::{BLOCK, Block, state_bytes};
-use rayon::prelude::*;
 
 /// All blocks of the run.
 pub fn blocks<const D: usize>(program: &Program<D>) -> Result<Vec<Block<D>>, RunError> {
@@ -15,20 +15,18 @@ pub fn blocks<const D: usize>(program: &Program<D>) -> Result<Vec<Block<D>>, Run
     let n_particles = plan.particles.count;
     let bytes = state_bytes(n_particles, D, program.n_columns());
     let strata = Strata::<D>::new(&plan.axes, n_particles);
-    let n_blocks = n_particles.div_ceil(BLOCK as u64);
-    (0..n_blocks)
-        .into_par_iter()
-        .map(|idx| {
-            let n_in_block = (n_particles - idx * BLOCK as u64).min(BLOCK as u64) as usize;
-            let mut block = Block::<D>::new(idx, n_in_block, program.n_columns())
-                .map_err(|_| RunError::OutOfMemory { bytes })?;
-            place(&plan.axes, plan.particles.placement, &strata, plan.seed, &mut block);
-            fill(program, &mut block)?;
-            Ok(block)
-        })
-        .collect::<Vec<Result<_, RunError>>>()
-        .into_iter()
-        .collect()
+    let n_blocks = n_particles.div_ceil(BLOCK as u64) as usize;
+    let blocks = parallel::map(n_blocks, &|block_idx| {
+        let idx = block_idx as u64;
+        let n_in_block = (n_particles - idx * BLOCK as u64).min(BLOCK as u64) as usize;
+        let mut block = Block::<D>::new(idx, n_in_block, program.n_columns())
+            .map_err(|_| RunError::OutOfMemory { bytes })?;
+        place(&plan.axes, plan.particles.placement, &strata, plan.seed, &mut block);
+        fill(program, &mut block)?;
+        Ok(block)
+    });
+    // The first block in order tells its error, whichever was found first.
+    blocks.into_iter().collect()
 }
 
 /// Evaluates the initial expressions at the positions of a block.

@@ -7,10 +7,8 @@ use super::program::{Program, Role};
 use crate::state::particles::CHUNK;
 use std::ops::Range;
 
-/// Lanes of the smallest value, so that the search vectorises.
-const LANES: usize = 8;
-
-/// Relaxes a chunk towards the means of its bins and returns the smallest value reached per component.
+/// Relaxes a chunk towards the means of its bins; the last component with a value below its limit is
+/// returned.
 ///
 /// - Equation: `W ← W̄ + (W − W̄) e^{−χΔt/2}`.
 /// - Symbols: `W̄` mean of this zone in the bin, `χ` rate, `decays` the exponential per slot.
@@ -24,24 +22,28 @@ pub fn relax<const D: usize>(
     decays: &[Option<f64>],
     slots: &[i32],
     columns: &mut [&mut [f64]],
-    mut see_lowest: impl FnMut(usize, f64),
-) {
-    let mut target = [0.0; CHUNK];
+    target: &mut [f64; CHUNK],
+    limits: &[f64],
+) -> Option<usize> {
+    let mut below = None;
     let n_slots = program.roles.len();
     for (column_idx, column) in columns.iter_mut().enumerate() {
         let (component, slot) = (column_idx / n_slots, column_idx % n_slots);
         match (program.roles[slot], decays[slot]) {
             (Role::Relaxing(_), Some(decay)) => {
-                gather(program, &means.columns[column_idx], slots, column, &mut target);
-                see_lowest(component, approach(column, &target, decay));
+                gather(program, &means.columns[column_idx], slots, column, target);
+                if approach(column, target, decay, limits[component]) {
+                    below = Some(component);
+                }
             }
             (Role::Mean, _) => {
-                gather(program, &means.mixed[component], slots, column, &mut target);
+                gather(program, &means.mixed[component], slots, column, target);
                 column.copy_from_slice(&target[..slots.len()]);
             }
             (Role::Relaxing(_), None) | (Role::Fixed, _) => {}
         }
     }
+    below
 }
 
 /// The mean that each particle sees; outside it is the particle's own value.
@@ -65,24 +67,15 @@ pub fn gather<const D: usize>(
     }
 }
 
+/// Says whether any value is now below the limit.
 #[inline(always)]
-fn approach(values: &mut [f64], target: &[f64; CHUNK], decay: f64) -> f64 {
-    let mut lowest = [f64::INFINITY; LANES];
-    let (head, tail) = values.as_chunks_mut::<LANES>();
-    let (target_head, _) = target.as_chunks::<LANES>();
-    for (values, target) in head.iter_mut().zip(target_head) {
-        for lane in 0..LANES {
-            let value = target[lane] + (values[lane] - target[lane]) * decay;
-            lowest[lane] = if value < lowest[lane] { value } else { lowest[lane] };
-            values[lane] = value;
-        }
-    }
-    let start = head.len() * LANES;
-    for (value, &target) in tail.iter_mut().zip(&target[start..]) {
+fn approach(values: &mut [f64], target: &[f64; CHUNK], decay: f64, limit: f64) -> bool {
+    let mut n_below = 0_u64;
+    for (value, &target) in values.iter_mut().zip(target) {
         *value = target + (*value - target) * decay;
-        lowest[0] = if *value < lowest[0] { *value } else { lowest[0] };
+        n_below |= u64::from(*value < limit);
     }
-    lowest.into_iter().fold(f64::INFINITY, f64::min)
+    n_below != 0
 }
 
 /// Splits the columns of a block at one chunk.

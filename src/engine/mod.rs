@@ -11,6 +11,7 @@ mod error;
 mod initial;
 mod mix;
 mod observe;
+mod parallel;
 mod place;
 mod program;
 mod run;

@@ -3,6 +3,7 @@
 //! Owns the strata and the first positions. May use `state` and the plan's words. It deliberately
 //! reads no initial values.
 
+use crate::maths::wide::Width;
 use crate::plan::{Axis, Placement};
 use crate::state::particles::{Block, CHUNK};
 use crate::state::stream::{Purpose, Stream};
@@ -75,7 +76,7 @@ pub fn place<const D: usize>(
     for (chunk_idx, range) in block.chunks().enumerate() {
         if placement != Placement::Ordered {
             for (axis, uniforms) in uniforms.iter_mut().enumerate() {
-                stream.uniforms(block.idx, (chunk_idx * D + axis) as u64, uniforms);
+                stream.uniforms(Width::widest(), block.idx, (chunk_idx * D + axis) as u64, uniforms);
             }
         }
         for (idx, particle_idx) in range.enumerate() {

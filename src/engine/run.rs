@@ -8,17 +8,17 @@ use super::average::{self, Means};
 use super::clock::Clock;
 use super::control::{Control, Settings};
 use super::error::RunError;
-use super::observe::{self, Instant};
+use super::observe::{self, Instant, Lab};
+use super::parallel::{self, Pool};
 use super::program::{Program, Work};
 use super::schedule::{Due, schedule, step_length};
 use super::snapshot::{Outcome, Snapshot};
 use super::step::{OnBlock, Pass, Scratch, Trouble};
 use super::{initial, walk::Leap};
+use crate::maths::wide::Width;
 use crate::plan::Plan;
-use crate::state::particles::{Block, state_bytes};
+use crate::state::particles::{BLOCK, Block, state_bytes};
 use crate::state::stream::{Purpose, Stream};
-use pulp::Arch;
-use rayon::prelude::*;
 
 /// Relative change of a carried amount that stops a run.
 const LOST: f64 = 1e-9;
@@ -31,7 +31,7 @@ type Sink<'a> = &'a mut (dyn FnMut(Snapshot) -> Result<(), RunError> + Send);
 /// Everything that lives as long as the run.
 pub struct Run<'a, const D: usize> {
     pub program: Program<'a, D>,
-    pub arch: Option<Arch>,
+    pub width: Width,
     pub blocks: Vec<Block<D>>,
     pub walk: Stream,
     pub bridge: Stream,
@@ -41,9 +41,13 @@ pub struct Run<'a, const D: usize> {
     pub pending: Option<Vec<Option<f64>>>,
     /// Whether `means` are those of the positions now.
     pub is_averaged: bool,
+    pub labs: Pool<Lab<D>>,
+    scratches: Pool<Scratch<D>>,
     groups: Vec<Group>,
+    blocks_per_group: usize,
     before: Vec<Amount>,
-    limits: Vec<f64>,
+    /// Smallest value allowed per component.
+    pub limits: Vec<f64>,
 }
 
 /// Sums and the first trouble of consecutive blocks.
@@ -109,7 +113,7 @@ impl<'a, const D: usize> Run<'a, D> {
         let n_groups = blocks.len().div_ceil(blocks_per_group);
         let groups = (0..n_groups).map(|_| Group::default()).collect();
         Ok(Self {
-            arch: (!settings.is_narrow).then(Arch::new),
+            width: if settings.is_narrow { Width::baseline() } else { Width::widest() },
             walk: Stream::new(plan.seed, Purpose::Walk),
             bridge: Stream::new(plan.seed, Purpose::Bridge),
             means: Means::default(),
@@ -117,7 +121,10 @@ impl<'a, const D: usize> Run<'a, D> {
             is_averaged: false,
             program,
             blocks,
+            labs: Pool::new(),
+            scratches: Pool::new(),
             groups,
+            blocks_per_group,
             before,
             limits,
         })
@@ -168,25 +175,25 @@ impl<'a, const D: usize> Run<'a, D> {
             decays: self.pending.as_deref().unwrap_or_default(),
             limits: &self.limits,
             n_lanes,
+            width: self.width,
         };
-        let arch = self.arch;
-        let blocks_per_group = self.blocks.len().div_ceil(self.groups.len());
-        let groups = self.blocks.par_chunks_mut(blocks_per_group).zip(&mut self.groups);
-        groups.for_each_init(
-            || Scratch::<D>::new(sums_len * n_lanes),
-            |scratch, (blocks, group)| {
-                scratch.sums.fill(0.0);
-                for block in blocks {
-                    let on_block = OnBlock { pass: &pass, block, scratch, trouble: &mut group.trouble };
-                    dispatch(arch, on_block);
+        let (width, scratches) = (self.width, &self.scratches);
+        let blocks = self.blocks.chunks_mut(self.blocks_per_group);
+        let mut tasks: Vec<_> = blocks.zip(&mut self.groups).collect();
+        parallel::for_each(&mut tasks, &|_, (blocks, group)| {
+            scratches.lend(Scratch::<D>::new, |scratch| {
+                scratch.sums.clear();
+                scratch.sums.resize(sums_len * n_lanes, 0.0);
+                for block in blocks.iter_mut() {
+                    width.run(OnBlock { pass: &pass, block, scratch, trouble: &mut group.trouble });
                 }
                 group.sums.clear();
                 group.sums.resize(sums_len, 0.0);
                 average::fold_lanes(&scratch.sums, n_lanes, stride, &mut group.sums);
-            },
-        );
+            });
+        });
         if let Some(trouble) = self.groups.iter().find_map(|group| group.trouble) {
-            return Err(self.explain(trouble, step));
+            return Err(self.explain(trouble, work, step));
         }
         if work.averages {
             self.merge();
@@ -242,12 +249,13 @@ impl<'a, const D: usize> Run<'a, D> {
 
     /// Names the particle behind a trouble.
     #[cold]
-    fn explain(&self, trouble: Trouble, step: u64) -> RunError {
+    fn explain(&self, trouble: Trouble, work: Work, step: u64) -> RunError {
         match trouble {
             Trouble::Position { particle } => RunError::NonFinitePosition { step: step + 1, particle },
-            Trouble::Negative { component, first, value } => {
-                let particle = self.find_below(component, first);
-                // The relaxation of a fused pass belongs to the step before.
+            Trouble::Negative { component, first } => {
+                let (particle, value) = self.find_below(component, first);
+                // A pass that relaxes and then averages does the relaxation of the step before.
+                let step = if work.averages { step } else { step + 1 };
                 RunError::NegativeConcentration {
                     step,
                     particle,
@@ -258,21 +266,25 @@ impl<'a, const D: usize> Run<'a, D> {
         }
     }
 
-    fn find_below(&self, component: usize, first: u64) -> u64 {
+    /// The first particle of the chunk that starts at `first` with a value below the limit.
+    fn find_below(&self, component: usize, first: u64) -> (u64, f64) {
         let n_slots = self.program.roles.len();
         let limit = self.limits[component];
-        let Some(block) = self.blocks.iter().rfind(|block| block.first() <= first) else { return first };
+        let block = &self.blocks[(first / BLOCK as u64) as usize];
         let start = (first - block.first()) as usize;
         let columns = &block.columns[component * n_slots..][..n_slots];
-        let found =
-            columns.iter().filter_map(|column| column[start..].iter().position(|&value| value < limit));
-        first + found.min().unwrap_or(0) as u64
+        let found = columns.iter().filter_map(|column| {
+            let offset = column[start..].iter().position(|&value| value < limit)?;
+            Some((offset, column[start + offset]))
+        });
+        let (offset, value) = found.min_by_key(|&(offset, _)| offset).unwrap_or((0, f64::NAN));
+        (first + offset as u64, value)
     }
 
     /// Does what is pending and compares the amounts.
     fn finish(&mut self) -> Result<Vec<f64>, RunError> {
         if self.pending.is_some() {
-            let step = self.program.plan.time.n_steps;
+            let step = self.program.plan.time.n_steps.saturating_sub(1);
             let leap = self.program.mover.leap(0.0, 0.0);
             self.pass(Work { mixes: true, ..Work::default() }, step, leap)?;
             self.pending = None;
@@ -280,15 +292,6 @@ impl<'a, const D: usize> Run<'a, D> {
         let after: Vec<f64> =
             amount::amounts(&self.blocks, self.program.n_columns()).iter().map(|amount| amount.sum).collect();
         Ok(amount::defects(&self.program, &self.before, &after))
-    }
-}
-
-/// Runs an operation in the widest code of this machine, or in baseline code.
-#[inline(always)]
-pub fn dispatch<T: pulp::NullaryFnOnce>(arch: Option<Arch>, operation: T) -> T::Output {
-    match arch {
-        Some(arch) => arch.dispatch(operation),
-        None => operation.call(),
     }
 }
 

@@ -7,27 +7,23 @@ use super::average::{self, Means};
 use super::mix;
 use super::program::{Program, Work};
 use super::walk::{Leap, Noise, Place};
-use crate::maths::chacha::{DRAW, Words};
+use crate::maths::wide::Width;
 use crate::state::particles::{Block, CHUNK};
 use crate::state::stream::Stream;
 
 /// What one thread needs to work on a chunk.
 pub struct Scratch<const D: usize> {
-    pub words: [Words; 2],
     pub noise: Noise<D>,
     pub slots: [i32; CHUNK],
+    /// The mean that each particle sees.
+    pub target: [f64; CHUNK],
     /// Sums per slot and lane.
     pub sums: Vec<f64>,
 }
 
 impl<const D: usize> Scratch<D> {
-    pub fn new(sums_len: usize) -> Box<Self> {
-        Box::new(Self {
-            words: [[0; DRAW]; 2],
-            noise: [[0.0; CHUNK]; D],
-            slots: [0; CHUNK],
-            sums: vec![0.0; sums_len],
-        })
+    pub fn new() -> Box<Self> {
+        Box::new(Self { noise: [[0.0; CHUNK]; D], slots: [0; CHUNK], target: [0.0; CHUNK], sums: Vec::new() })
     }
 }
 
@@ -41,7 +37,6 @@ pub enum Trouble {
     Negative {
         component: usize,
         first: u64,
-        value: f64,
     },
 }
 
@@ -59,6 +54,7 @@ pub struct Pass<'a, const D: usize> {
     /// Smallest value allowed per component.
     pub limits: &'a [f64],
     pub n_lanes: usize,
+    pub width: Width,
 }
 
 /// One block of a pass, to be dispatched to wide or narrow code.
@@ -85,15 +81,16 @@ impl<const D: usize> pulp::NullaryFnOnce for OnBlock<'_, D> {
             if pass.work.mixes {
                 program.grid.locate(positions.each_ref().map(|axis| &**axis), slots);
                 let mut chunk = mix::cut(&mut columns, range.clone());
-                mix::relax(program, pass.means, pass.decays, slots, &mut chunk, |component, value| {
-                    if value < pass.limits[component] {
-                        trouble.get_or_insert(Trouble::Negative { component, first, value });
-                    }
-                });
+                let target = &mut scratch.target;
+                let below =
+                    mix::relax(program, pass.means, pass.decays, slots, &mut chunk, target, pass.limits);
+                if let Some(component) = below {
+                    trouble.get_or_insert(Trouble::Negative { component, first });
+                }
             }
             if pass.work.moves {
                 let place = Place { block_idx: block.idx, chunk_idx: chunk_idx as u64, step: pass.step };
-                program.mover.draw(pass.stream, place, &mut scratch.words, &mut scratch.noise);
+                program.mover.draw(pass.width, pass.stream, place, &mut scratch.noise);
                 pass.leap.apply(&mut positions, &scratch.noise);
             }
             if pass.work.bounds {

@@ -3,8 +3,8 @@
 //! Owns the move of positions. May use `maths`, `state` and the plan's words. It deliberately knows no
 //! sides.
 
-use crate::maths::chacha::{DRAW, Words};
-use crate::maths::normal;
+use crate::maths::chacha::DRAW;
+use crate::maths::wide::Width;
 use crate::plan::{Normals, Walk};
 use crate::state::particles::{CHUNK, CHUNKS_PER_BLOCK};
 use crate::state::stream::Stream;
@@ -56,8 +56,7 @@ impl<const D: usize> Mover<D> {
 
     /// Draws the noise of one chunk for the axes that have any. The place of a draw follows from block,
     /// chunk and step alone.
-    #[inline(always)]
-    pub fn draw(&self, stream: &Stream, place: Place, words: &mut [Words; 2], noise: &mut Noise<D>) {
+    pub fn draw(&self, width: Width, stream: &Stream, place: Place, noise: &mut Noise<D>) {
         let first = (place.step * CHUNKS_PER_BLOCK as u64 + place.chunk_idx) * D as u64;
         for (axis, noise) in noise.iter_mut().enumerate() {
             let number = first + axis as u64;
@@ -65,17 +64,9 @@ impl<const D: usize> Mover<D> {
                 noise.fill(0.0);
                 continue;
             }
-            let [high, low] = words;
             match self.normals {
-                Normals::Single => {
-                    stream.words(place.block_idx, number, high);
-                    normal::single(high, noise);
-                }
-                Normals::Double => {
-                    stream.words(place.block_idx, 2 * number, high);
-                    stream.words(place.block_idx, 2 * number + 1, low);
-                    normal::double(high, low, noise);
-                }
+                Normals::Single => stream.single_normals(width, place.block_idx, number, noise),
+                Normals::Double => stream.double_normals(width, place.block_idx, number, noise),
             }
         }
     }

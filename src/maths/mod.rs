@@ -10,3 +10,4 @@ pub mod pentadiagonal;
 pub mod quadrature;
 pub mod scalar;
 pub mod special;
+pub mod wide;

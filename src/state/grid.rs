@@ -54,26 +54,56 @@ impl<const D: usize> Grid<D> {
     /// A position on an inner face belongs to the upper bin, on the upper end to the last.
     #[inline(always)]
     pub fn locate(&self, positions: [&[f64]; D], slots: &mut [i32]) {
-        slots.fill(0);
-        for (axis, positions) in positions.iter().enumerate() {
-            let (low, inverse_width) = (self.low[axis], self.inverse_width[axis]);
-            let (n, last) = (self.bins[axis] as i32, self.bins[axis] as i32 - 1);
-            if n > 1 {
-                for (slot, &x) in slots.iter_mut().zip(*positions) {
-                    let along = (((x - low) * inverse_width) as i32).max(0).min(last);
-                    *slot = *slot * n + along;
-                }
+        let n = slots.len();
+        let positions = positions.map(|axis| &axis[..n]);
+        let last = self.bins.map(|bins| (bins - 1) as f64);
+        for (idx, slot) in slots.iter_mut().enumerate() {
+            let along = |axis: usize| {
+                let along = floor((positions[axis][idx] - self.low[axis]) * self.inverse_width[axis]);
+                if along < last[axis] { along } else { last[axis] }
+            };
+            let mut bin = if D > 0 { along(0) } else { 0.0 };
+            for axis in 1..D {
+                bin = bin * (last[axis] + 1.0) + along(axis);
             }
+            *slot = low_bits(bin);
         }
+        if self.has_open_side() {
+            self.put_outside(positions, slots);
+        }
+    }
+
+    /// Moves the slots of particles beyond open sides.
+    #[inline(always)]
+    fn put_outside(&self, positions: [&[f64]; D], slots: &mut [i32]) {
+        let outside = self.n_bins() as i32;
         for (axis, positions) in positions.iter().enumerate() {
             if self.is_open[axis] {
-                let (low, high, outside) = (self.low[axis], self.high[axis], self.n_bins() as i32);
+                let (low, high) = (self.low[axis], self.high[axis]);
                 for (slot, &x) in slots.iter_mut().zip(*positions) {
                     *slot = if x >= low && x <= high { *slot } else { outside };
                 }
             }
         }
     }
+}
+
+/// Added to a number of moderate size it leaves the nearest whole number in the low bits.
+const SHIFT: f64 = 4_503_599_627_370_496.0;
+
+/// Largest whole number not above `x`, and 0 below 0 and for what is not a number. Sums with a large
+/// power of two vectorise on every machine; conversions to integers do not.
+#[inline(always)]
+fn floor(x: f64) -> f64 {
+    let x = if x > 0.0 { x } else { 0.0 };
+    let nearest = (x + SHIFT) - SHIFT;
+    if nearest > x { nearest - 1.0 } else { nearest }
+}
+
+/// A whole number below 2³¹ as an integer.
+#[inline(always)]
+fn low_bits(whole: f64) -> i32 {
+    (whole + SHIFT).to_bits() as i32
 }
 
 #[cfg(test)]
@@ -94,6 +124,21 @@ mod tests {
         let mut slots = [0; 4];
         grid.locate([&[-1e-300, 1.5, 1.0, f64::INFINITY]], &mut slots);
         assert_eq!(slots, [10, 10, 9, 10]);
+    }
+
+    #[test]
+    fn floors_are_exact_on_and_beside_whole_numbers() {
+        for whole in [0.0_f64, 1.0, 2.0, 3.0, 299.0, 1e6, 2_147_483_646.0] {
+            assert_eq!(floor(whole), whole);
+            assert_eq!(floor(whole + 0.5), whole);
+            assert_eq!(low_bits(whole), whole as i32);
+            if whole > 0.0 {
+                assert_eq!(floor(whole.next_down()), whole - 1.0);
+            }
+        }
+        assert_eq!(floor(-3.5), 0.0);
+        assert_eq!(floor(f64::NAN), 0.0);
+        assert!(floor(1e300) >= 1e15);
     }
 
     #[test]

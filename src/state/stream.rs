@@ -4,7 +4,9 @@
 //! state: leaving out a purpose, a step or a block shifts no other draw.
 
 use crate::maths::chacha::{self, DRAW, Words};
-use crate::maths::normal::uniform_53;
+use crate::maths::normal::{self, uniform_53};
+use crate::maths::wide::Width;
+use pulp::NullaryFnOnce;
 
 /// What a draw is for. Each purpose has its own key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,19 +44,63 @@ impl Stream {
     }
 
     /// Words of draw `number` of block `block_idx`.
-    #[inline(always)]
-    pub fn words(&self, block_idx: u64, number: u64, words: &mut Words) {
-        chacha::draw(&self.key, block_idx, number, words);
+    pub fn words(&self, width: Width, block_idx: u64, number: u64, words: &mut Words) {
+        width.run(Draw { key: &self.key, block_idx, number, words });
+    }
+
+    /// Normal numbers in 32-bit arithmetic from draw `number`.
+    pub fn single_normals(&self, width: Width, block_idx: u64, number: u64, normals: &mut [f64; DRAW]) {
+        let mut words = [0; DRAW];
+        self.words(width, block_idx, number, &mut words);
+        width.run(Single { words: &words, normals });
+    }
+
+    /// Normal numbers in 64-bit arithmetic from draws `2·number` and `2·number + 1`.
+    pub fn double_normals(&self, width: Width, block_idx: u64, number: u64, normals: &mut [f64; DRAW]) {
+        let (mut high, mut low) = ([0; DRAW], [0; DRAW]);
+        self.words(width, block_idx, 2 * number, &mut high);
+        self.words(width, block_idx, 2 * number + 1, &mut low);
+        normal::double(&high, &low, normals);
     }
 
     /// Uniform numbers in (0, 1) with 53 bits from the two draws `2·number` and `2·number + 1`.
-    pub fn uniforms(&self, block_idx: u64, number: u64, uniforms: &mut [f64; DRAW]) {
+    pub fn uniforms(&self, width: Width, block_idx: u64, number: u64, uniforms: &mut [f64; DRAW]) {
         let (mut high, mut low) = ([0; DRAW], [0; DRAW]);
-        self.words(block_idx, 2 * number, &mut high);
-        self.words(block_idx, 2 * number + 1, &mut low);
+        self.words(width, block_idx, 2 * number, &mut high);
+        self.words(width, block_idx, 2 * number + 1, &mut low);
         for ((uniform, &high), &low) in uniforms.iter_mut().zip(&high).zip(&low) {
             *uniform = uniform_53(high, low);
         }
+    }
+}
+
+struct Draw<'a> {
+    key: &'a [u32; 8],
+    block_idx: u64,
+    number: u64,
+    words: &'a mut Words,
+}
+
+impl NullaryFnOnce for Draw<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        chacha::draw(self.key, self.block_idx, self.number, self.words);
+    }
+}
+
+struct Single<'a> {
+    words: &'a Words,
+    normals: &'a mut [f64; DRAW],
+}
+
+impl NullaryFnOnce for Single<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        normal::single(self.words, self.normals);
     }
 }
 
@@ -66,7 +112,7 @@ mod tests {
     fn purposes_seeds_and_blocks_differ() {
         let first = |seed, purpose, block_idx| {
             let mut words = [0; DRAW];
-            Stream::new(seed, purpose).words(block_idx, 0, &mut words);
+            Stream::new(seed, purpose).words(Width::baseline(), block_idx, 0, &mut words);
             words[0]
         };
         let reference = first(42, Purpose::Walk, 0);

@@ -79,7 +79,7 @@ impl<const D: usize> Lab<D> {
             components: zeros(program.n_components()),
             unreacted: zeros(n_species),
             species: zeros(n_species),
-            scratch: Scratch::new(0),
+            scratch: Scratch::new(),
             bridge_noise: [[0.0; CHUNK]; D],
         })
     }
@@ -124,15 +124,23 @@ impl<const D: usize> pulp::NullaryFnOnce for Load<'_, D> {
         program.grid.locate(positions.each_ref().map(|axis| &**axis), slots);
         if let Some(decays) = &run.pending {
             let mut columns = mix::cut(&mut lab.columns, 0..n);
-            mix::relax(program, &run.means, decays, slots, &mut columns, |_, _| {});
+            // A value out of range is reported by the step itself.
+            mix::relax(
+                program,
+                &run.means,
+                decays,
+                slots,
+                &mut columns,
+                &mut lab.scratch.target,
+                &run.limits,
+            );
         }
         if let Instant::Between(between) = instant {
             let chunk_idx = (range.start / CHUNK) as u64;
             let place = Place { block_idx: block.idx, chunk_idx, step: between.step };
-            let words = &mut lab.scratch.words;
-            program.mover.draw(&run.walk, place, words, &mut lab.scratch.noise);
+            program.mover.draw(run.width, &run.walk, place, &mut lab.scratch.noise);
             let place = Place { step: between.bridge, ..place };
-            program.mover.draw(&run.bridge, place, words, &mut lab.bridge_noise);
+            program.mover.draw(run.width, &run.bridge, place, &mut lab.bridge_noise);
             between.along.apply(&mut positions, &lab.scratch.noise);
             between.across.apply(&mut positions, &lab.bridge_noise);
             for (rule, positions) in program.rules.iter().zip(&mut positions) {
@@ -149,6 +157,7 @@ pub struct Resolve<'a, const D: usize> {
     pub program: &'a Program<'a, D>,
     pub instant: &'a Instant<D>,
     pub means: &'a Means,
+    pub limits: &'a [f64],
     pub lab: &'a mut Lab<D>,
 }
 
@@ -157,11 +166,20 @@ impl<const D: usize> pulp::NullaryFnOnce for Resolve<'_, D> {
 
     #[inline(always)]
     fn call(self) {
-        let Self { program, instant, means, lab } = self;
+        let Self { program, instant, means, limits, lab } = self;
         let n = lab.n;
         if let Instant::Between(between) = instant {
             let mut columns = mix::cut(&mut lab.columns, 0..n);
-            mix::relax(program, means, &between.decays, &lab.slots[..n], &mut columns, |_, _| {});
+            // A value out of range is reported by the step itself.
+            mix::relax(
+                program,
+                means,
+                &between.decays,
+                &lab.slots[..n],
+                &mut columns,
+                &mut lab.scratch.target,
+                limits,
+            );
         }
         let n_slots = program.roles.len();
         for component in 0..program.n_components() {

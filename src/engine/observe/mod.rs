@@ -10,18 +10,19 @@ mod tally;
 
 use super::average::{Means, blocks_per_group};
 use super::error::RunError;
+use super::parallel;
 use super::program::unsound;
-use super::run::{Run, dispatch};
+use super::run::Run;
 use super::schedule::Due;
 use super::snapshot::{Snapshot, Values};
 use crate::plan::OutputKind;
 use crate::state::grid::Grid;
-use crate::state::particles::{CHUNK, state_bytes};
-pub use lab::Instant;
-use lab::{Lab, Load, Resolve};
+use crate::state::particles::{Block, CHUNK, state_bytes};
+pub use lab::{Instant, Lab};
+use lab::{Load, Resolve};
 use mixing::Mixing;
-use rayon::prelude::*;
 use std::borrow::Cow;
+use std::ops::Range;
 use tally::Tally;
 
 /// All snapshots of one due time, in the order of outputs.
@@ -81,7 +82,7 @@ fn sum<const D: usize>(
     let (n_first, n_second) = (first_at[tallies.len()], second_at[tallies.len()]);
     let mut first = Vec::new();
     if tallies.iter().any(|tally| !matches!(tally, Tally::Particles)) {
-        first = sweep(run, instant, Some(means), n_first, |lab, sums| {
+        first = sweep(run, instant, Some(means), n_first, &|lab, sums| {
             for (idx, tally) in tallies.iter().enumerate() {
                 tally.add_first(lab, &mut sums[first_at[idx]..first_at[idx + 1]]);
             }
@@ -89,7 +90,7 @@ fn sum<const D: usize>(
     }
     let mut second = Vec::new();
     if n_second > 0 {
-        second = sweep(run, instant, Some(means), n_second, |lab, sums| {
+        second = sweep(run, instant, Some(means), n_second, &|lab, sums| {
             for (idx, tally) in tallies.iter().enumerate() {
                 let first = &first[first_at[idx]..first_at[idx + 1]];
                 tally.add_second(lab, first, &mut sums[second_at[idx]..second_at[idx + 1]]);
@@ -116,7 +117,7 @@ fn offsets<const D: usize>(tallies: &[Tally<D>], len: impl Fn(&Tally<D>) -> usiz
 /// Bin means of the carried columns at the instant.
 fn average<const D: usize>(run: &Run<D>, instant: &Instant<D>, grid: &Grid<D>) -> Means {
     let stride = run.program.n_columns() + 1;
-    let sums = sweep(run, instant, None, grid.n_slots() * stride, |lab, sums| {
+    let sums = sweep(run, instant, None, grid.n_slots() * stride, &|lab, sums| {
         let mut slots = [0; CHUNK];
         grid.locate(lab.positions(), &mut slots[..lab.n]);
         super::average::accumulate(&slots[..lab.n], &lab.columns, 0..lab.n, 1, sums);
@@ -133,28 +134,27 @@ fn sweep<const D: usize>(
     instant: &Instant<D>,
     means: Option<&Means>,
     n_sums: usize,
-    add: impl Fn(&Lab<D>, &mut [f64]) + Sync,
+    add: &(dyn Fn(&Lab<D>, &mut [f64]) + Sync),
 ) -> Vec<f64> {
     let n_particles = run.program.plan.particles.count;
     let bytes = state_bytes(n_particles, D, run.program.n_columns());
-    let groups = run.blocks.par_chunks(blocks_per_group(n_particles, bytes, n_sums));
-    let partial = groups.map_init(
-        || Lab::new(&run.program),
-        |lab, blocks| {
-            let mut sums = vec![0.0; n_sums];
-            for block in blocks {
-                for range in block.chunks() {
-                    dispatch(run.arch, Load { run, instant, block, range, lab });
-                    if let Some(means) = means {
-                        dispatch(run.arch, Resolve { program: &run.program, instant, means, lab });
+    let blocks_per_group = blocks_per_group(n_particles, bytes, n_sums);
+    let groups: Vec<_> = run.blocks.chunks(blocks_per_group).collect();
+    let partial = parallel::map(groups.len(), &|group_idx| {
+        let mut sums = vec![0.0; n_sums];
+        run.labs.lend(
+            || Lab::new(&run.program),
+            |lab| {
+                for block in groups[group_idx] {
+                    for range in block.chunks() {
+                        load(run, instant, means, block, range, lab);
+                        add(lab, &mut sums);
                     }
-                    add(lab, &mut sums);
                 }
-            }
-            sums
-        },
-    );
-    let partial: Vec<Vec<f64>> = partial.collect();
+            },
+        );
+        sums
+    });
     let mut merged = vec![0.0; n_sums];
     for group in partial {
         merged.iter_mut().zip(group).for_each(|(sum, part)| *sum += part);
@@ -162,27 +162,43 @@ fn sweep<const D: usize>(
     merged
 }
 
+/// One chunk at the instant, with concentrations if means are given.
+fn load<const D: usize>(
+    run: &Run<D>,
+    instant: &Instant<D>,
+    means: Option<&Means>,
+    block: &Block<D>,
+    range: Range<usize>,
+    lab: &mut Lab<D>,
+) {
+    run.width.run(Load { run, instant, block, range, lab });
+    if let Some(means) = means {
+        run.width.run(Resolve { program: &run.program, instant, means, limits: &run.limits, lab });
+    }
+}
+
 /// Every particle, in order.
 fn particles<const D: usize>(run: &Run<D>, instant: &Instant<D>, means: &Means) -> Values {
     let n_species = run.program.plan.species.len();
-    let per_block = run.blocks.par_iter().map_init(
-        || Lab::new(&run.program),
-        |lab, block| {
-            let mut columns = vec![Vec::with_capacity(block.n_particles); D + n_species];
-            for range in block.chunks() {
-                dispatch(run.arch, Load { run, instant, block, range, lab });
-                dispatch(run.arch, Resolve { program: &run.program, instant, means, lab });
-                let n = lab.n;
-                let sources = lab.positions.iter().chain(&lab.species);
-                columns
-                    .iter_mut()
-                    .zip(sources)
-                    .for_each(|(column, source)| column.extend_from_slice(&source[..n]));
-            }
-            columns
-        },
-    );
-    let per_block: Vec<Vec<Vec<f64>>> = per_block.collect();
+    let of_block = |block_idx: usize| {
+        let block = &run.blocks[block_idx];
+        let mut columns = vec![Vec::with_capacity(block.n_particles); D + n_species];
+        run.labs.lend(
+            || Lab::new(&run.program),
+            |lab| {
+                for range in block.chunks() {
+                    load(run, instant, Some(means), block, range, lab);
+                    let sources = lab.positions.iter().chain(&lab.species);
+                    columns
+                        .iter_mut()
+                        .zip(sources)
+                        .for_each(|(column, source)| column.extend(&source[..lab.n]));
+                }
+            },
+        );
+        columns
+    };
+    let per_block: Vec<Vec<Vec<f64>>> = parallel::map(run.blocks.len(), &of_block);
     let column = |idx: usize| per_block.iter().flat_map(|columns| columns[idx].iter().copied()).collect();
     Values::Particles {
         positions: (0..D).map(column).collect(),
