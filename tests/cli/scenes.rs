@@ -31,7 +31,7 @@ fn check_reports_all_files_and_all_mistakes() {
     let count = |name: &str| {
         messages.iter().filter(|m| m["severity"] == "error" && m["labels"][0]["file"] == name).count()
     };
-    assert_eq!((count("scene.lam"), count("b.lam"), count("c.lam")), (0, 2, 1), "{}", finished.stderr);
+    assert_eq!((count("scene.lam"), count("b.lam"), count("c.lam")), (0, 3, 1), "{}", finished.stderr);
     let misspelt = messages.iter().find(|m| m["message"].as_str().is_some_and(|text| text.contains("DD")));
     assert!(misspelt.is_some_and(|m| m["help"].to_string().contains("`D`")), "{}", finished.stderr);
 }

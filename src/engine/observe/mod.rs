@@ -15,7 +15,7 @@ use super::program::unsound;
 use super::run::Run;
 use super::schedule::Due;
 use super::snapshot::{Snapshot, Values};
-use crate::plan::OutputKind;
+use crate::plan::{Output, OutputKind, Quantity};
 use crate::state::grid::Grid;
 use crate::state::particles::{Block, CHUNK, state_bytes};
 pub use lab::{Instant, Lab};
@@ -53,8 +53,21 @@ pub fn observe<const D: usize>(
         tallies.push(Tally::new(program, output, mixing).ok_or_else(bad_bins)?);
     }
     let values = sum(run, instant, &means, &tallies);
-    let snapshot = |(&output_idx, values)| Snapshot { output_idx, t: due.t, values };
+    let snapshot = |(&output_idx, values)| Snapshot {
+        output_idx,
+        t: due.t,
+        values: listed_only(values, &program.plan.outputs[output_idx]),
+    };
     Ok(due.outputs.iter().zip(values).map(snapshot).collect())
+}
+
+/// Particles carry a column for each species of the plan; an output has those that it lists.
+fn listed_only(values: Values, output: &Output) -> Values {
+    let Values::Particles { positions, concentrations } = values else { return values };
+    let column = |quantity: &Quantity| match *quantity {
+        Quantity::Species(s) | Quantity::Pair(s, _) => concentrations[s].clone(),
+    };
+    Values::Particles { positions, concentrations: output.quantities.iter().map(column).collect() }
 }
 
 fn bad_bins() -> RunError {
