@@ -9,8 +9,11 @@ const COLUMN: &str = include_str!("../experiments/gramling/gramling.lam");
 
 fn compile_with(text: &str, settings: &Settings, options: &Options) -> Compiled {
     let checked = lamella::check(Sources::single("scene.lam", text), settings, options);
-    let messages: Vec<String> =
-        checked.diagnostics.iter().map(|diagnostic| format!("{}: {}", diagnostic.code, diagnostic.message)).collect();
+    let messages: Vec<String> = checked
+        .diagnostics
+        .iter()
+        .map(|diagnostic| format!("{}: {}", diagnostic.code, diagnostic.message))
+        .collect();
     checked.compiled.unwrap_or_else(|| panic!("no plan: {messages:#?}"))
 }
 
@@ -42,7 +45,8 @@ fn units_layout_comments_and_order_do_not_change_the_hash() {
     let zones = lines.iter().position(|line| line.starts_with("mixing")).expect("zones");
     let block: Vec<&str> = lines.splice(zones..zones + 4, []).collect();
     // Outputs keep their order among themselves: it numbers the tables' rows.
-    let (outputs, mut rest): (Vec<&str>, Vec<&str>) = lines.into_iter().partition(|line| line.starts_with("output"));
+    let (outputs, mut rest): (Vec<&str>, Vec<&str>) =
+        lines.into_iter().partition(|line| line.starts_with("output"));
     let (species, mut others): (Vec<&str>, Vec<&str>) =
         rest.drain(..).partition(|line| line.starts_with("species"));
     others.reverse();
@@ -51,7 +55,16 @@ fn units_layout_comments_and_order_do_not_change_the_hash() {
     let file = lamella::syntax::parse(lamella::source::FileId(0), COLUMN).0;
     assert_eq!(compile(&lamella::syntax::format(&file, COLUMN)).hash, hash, "layout");
     assert_eq!(compile(&edited("param D   =", "let D =")).hash, hash, "a parameter that became a constant");
-    assert_eq!(compile(&COLUMN.replace("chi", "exchange_rate").replace("exchange_rate = exchange_rate)", "chi = exchange_rate)")).hash, hash, "a renamed parameter");
+    assert_eq!(
+        compile(
+            &COLUMN
+                .replace("chi", "exchange_rate")
+                .replace("exchange_rate = exchange_rate)", "chi = exchange_rate)")
+        )
+        .hash,
+        hash,
+        "a renamed parameter"
+    );
 }
 
 #[test]
@@ -98,13 +111,19 @@ fn the_column_carries_one_field_in_one_zone_and_says_why() {
     let b = compiled.plan.species.iter().find(|species| species.name == "B").expect("species B");
     assert_eq!((b.constant, b.terms.as_slice()), (20.0, &[(0, -1.0)][..]), "B = c0 - A");
     for what in ["zone `fast`", "species `B`", "neighbour search", "reaction in a step"] {
-        assert!(compiled.left_out.iter().any(|item| item.what.contains(what)), "{what}: {:?}", compiled.left_out);
+        assert!(
+            compiled.left_out.iter().any(|item| item.what.contains(what)),
+            "{what}: {:?}",
+            compiled.left_out
+        );
     }
 }
 
 #[test]
 fn relations_are_found_however_they_are_written() {
-    for initial in ["if x < 0 cm then 0 else c0", "if x >= 0 cm then c0 else 0", "c0 - (if x < 0 cm then c0 else 0)"] {
+    for initial in
+        ["if x < 0 cm then 0 else c0", "if x >= 0 cm then c0 else 0", "c0 - (if x < 0 cm then c0 else 0)"]
+    {
         let compiled = compile(&edited("initial B = c0 - A", &format!("initial B = {initial}")));
         assert_eq!(compiled.plan.components.len(), 1, "{initial}");
     }
@@ -115,18 +134,25 @@ fn relations_are_found_however_they_are_written() {
 #[test]
 fn what_nobody_reads_leaves_the_plan_as_it_was() {
     let plain = compile(COLUMN);
-    let with_species = edited("species AB", "species C, E \"never read\"\nspecies AB") + "initial C = 3 * A\n";
+    let with_species =
+        edited("species AB", "species C, E \"never read\"\nspecies AB") + "initial C = 3 * A\n";
     assert_eq!(compile(&with_species).hash, plain.hash);
     let with_twin = format!("{COLUMN}output total AB every 10 s\n");
     assert_eq!(compile(&with_twin).hash, plain.hash, "an output twice");
     let with_empty_zone = edited("  slow:", "  none: fraction 0, rate 3e-4 /s\n  slow:");
     assert_eq!(compile(&with_empty_zone).hash, plain.hash, "a zone of nothing");
-    let halves = edited("  slow: fraction eta,     rate chi", "  slow: fraction eta / 2, rate chi\n  more: fraction eta / 2, rate chi");
+    let halves = edited(
+        "  slow: fraction eta,     rate chi",
+        "  slow: fraction eta / 2, rate chi\n  more: fraction eta / 2, rate chi",
+    );
     assert_eq!(compile(&halves).plan.mixing.expect("zones").zones.len(), 2, "equal rates are one zone");
-    let wide = edited("domain line x = -7.5 cm .. 7.5 cm, frame moving v", "domain rect x = -7.5 cm .. 7.5 cm, y = 0 cm .. 1 cm, frame moving (v, 0 m/s)")
-        .replace("boundary left, right reflect", "boundary left, right, bottom, top reflect")
-        .replace("flow uniform v", "flow uniform (v, 0 m/s)")
-        .replace("average bins 300", "average bins 300 x 1");
+    let wide = edited(
+        "domain line x = -7.5 cm .. 7.5 cm, frame moving v",
+        "domain rect x = -7.5 cm .. 7.5 cm, y = 0 cm .. 1 cm, frame moving (v, 0 m/s)",
+    )
+    .replace("boundary left, right reflect", "boundary left, right, bottom, top reflect")
+    .replace("flow uniform v", "flow uniform (v, 0 m/s)")
+    .replace("average bins 300", "average bins 300 x 1");
     let wide = compile(&wide);
     assert_eq!(wide.plan.axes.len(), 1, "an axis without gradient");
     assert_eq!(wide.plan.walk.spread, plain.plan.walk.spread);
@@ -159,7 +185,9 @@ fn a_plan_document_reads_back_and_notices_changes() {
 
 #[test]
 fn limits_refuse_at_the_line_with_what_would_work() {
-    let messages = |text: &str| lamella::check(Sources::single("scene.lam", text), &Settings::default(), &Options::default());
+    let messages = |text: &str| {
+        lamella::check(Sources::single("scene.lam", text), &Settings::default(), &Options::default())
+    };
     let coarse = edited("step 2 s", "step 3000 s").replace("run to 1510 s", "run to 6000 s");
     let checked = messages(&coarse);
     let refusal = checked.diagnostics.iter().find(|d| d.code.0 == "N202").expect("refused");

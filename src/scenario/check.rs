@@ -2,12 +2,12 @@
 
 use super::expression::{Expr, Node, Type};
 use super::scope::{BUILT_IN_FUNCTIONS, Locals, Origin, Progress, Scope};
-use crate::diagnostic::codes::{D005, D006, D007, D008, D009, U101, U102, U103, U105, U106, U107, U108};
-use crate::diagnostic::{Diagnostic, did_you_mean};
+use crate::diagnostic::Diagnostic;
+use crate::diagnostic::codes::{D005, D006, D008, D009, U101, U103, U106, U108};
 use crate::maths::operator::{Binary, Unary};
 use crate::source::Span;
 use crate::syntax::tree::{self, BinaryOperator, ExprKind, UnaryOperator};
-use crate::units::{self, Dimension, Unit, UnitError};
+use crate::units::Dimension;
 
 /// Nodes that one expression may have after functions are put in.
 const MAX_EXPRESSION_SIZE: u32 = 50_000;
@@ -107,94 +107,6 @@ impl<'a> Checker<'a> {
             return None;
         }
         Some(expr)
-    }
-
-    pub(super) fn number(&mut self, number: &tree::Number, span: Span) -> Option<Expr> {
-        let unit = match &number.unit {
-            None => Unit::ONE,
-            Some(written) => match Unit::parse(&written.value) {
-                Ok(unit) => unit,
-                Err(error) => {
-                    self.unknown_unit(&error, number, written.span);
-                    return None;
-                }
-            },
-        };
-        let Some(value) = unit.to_si(&number.digits) else {
-            self.report(
-                Diagnostic::error(U106, "this number is too large")
-                    .at(span, "beyond 1.8e308 in SI units")
-                    .found(number.digits.clone())
-                    .expected("a number below 1.8e308"),
-            );
-            return None;
-        };
-        if value == 0.0
-            && number.digits.bytes().any(|b| (b'1'..=b'9').contains(&mantissa_byte(&number.digits, b)))
-        {
-            self.report(
-                Diagnostic::error(U106, "this number is too small")
-                    .at(span, "it would become zero")
-                    .found(number.digits.clone())
-                    .expected("zero, or a number above 5e-324"),
-            );
-            return None;
-        }
-        self.note_unit_that_is_a_name(number, span);
-        let kind =
-            if number.unit.is_none() && value == 0.0 { Type::Zero } else { Type::Number(unit.dimension) };
-        Some(Expr::constant(value, kind, span))
-    }
-
-    /// `0.8 /d` is per day even where the scene has a `d`: say so.
-    fn note_unit_that_is_a_name(&mut self, number: &tree::Number, span: Span) {
-        let Some(name) = number.unit.as_ref().and_then(|unit| unit.value.strip_prefix('/')) else { return };
-        let Some(entry) = self.scope.get(name) else { return };
-        let (origin, defined) = (entry.origin.describe(), entry.span);
-        self.diagnostics.push(
-            Diagnostic::remark(
-                U107,
-                format!("`/{name}` after a number is the unit 1/{name}, not the name `{name}`"),
-            )
-            .at(span, format!("read as per {name}"))
-            .also(defined, format!("`{name}` is {origin} of this scene"))
-            .help(format!("for the name write `{} / {name}`, with a blank after the slash", number.digits)),
-        );
-    }
-
-    fn unknown_unit(&mut self, error: &UnitError, number: &tree::Number, span: Span) {
-        let sub = |start: usize, end: usize| {
-            let base = span.start as usize;
-            Span::new(span.file, base + start, (base + end).min(span.end as usize).max(base + start))
-        };
-        let mut message = match error {
-            UnitError::UnknownSymbol { symbol, start, end } => {
-                let mut message = Diagnostic::error(U105, format!("`{symbol}` is not a unit"))
-                    .at(sub(*start, *end), "unknown unit")
-                    .found(format!("`{symbol}`"))
-                    .expected("a unit such as `m`, `d`, `mol/L`");
-                let known: Vec<String> = units::known_symbols().collect();
-                if let Some(candidate) = did_you_mean(symbol, known.iter().map(String::as_str)) {
-                    message = message.help(format!("did you mean `{candidate}`?"));
-                }
-                message
-            }
-            UnitError::Malformed { start, end } => Diagnostic::error(U105, "this is not a unit")
-                .at(sub(*start, *end), "cannot be read as a unit")
-                .found("something else")
-                .expected("symbols joined by `/` or `·`, powers as `m^2`"),
-            UnitError::ExponentTooLarge { start, end } => {
-                Diagnostic::error(U105, "the power of this unit is too large")
-                    .at(sub(*start, *end), "beyond 9")
-                    .found("a power beyond 9")
-                    .expected("a power from -9 to 9")
-            }
-        };
-        let word = number.unit.as_ref().map(|unit| unit.value.as_str()).unwrap_or_default();
-        if self.scope.get(word).is_some() || self.axes.iter().any(|(axis, _)| axis == word) || word == "t" {
-            message = message.help(format!("to multiply write `{} * {word}`", number.digits));
-        }
-        self.report(message);
     }
 
     fn path(&mut self, path: &'a [tree::Name], span: Span, allow: Allow, locals: &Locals) -> Option<Expr> {
@@ -394,7 +306,7 @@ impl<'a> Checker<'a> {
         Some(Expr::binary(op, a, b, kind, span))
     }
 
-    fn mismatch(&mut self, sign: &str, a: &Expr, b: &Expr, span: Span) -> Option<Expr> {
+    pub(super) fn mismatch(&mut self, sign: &str, a: &Expr, b: &Expr, span: Span) -> Option<Expr> {
         let verb = match sign {
             "+" => "add",
             "-" => "subtract",
@@ -453,169 +365,4 @@ impl<'a> Checker<'a> {
         };
         Some(Expr::select(condition, then, otherwise, kind, span))
     }
-
-    fn call(
-        &mut self,
-        function: &'a tree::Name,
-        arguments: &'a [tree::Argument],
-        span: Span,
-        allow: Allow,
-        locals: &Locals,
-    ) -> Option<Expr> {
-        let checked: Vec<Option<Expr>> =
-            arguments.iter().map(|argument| self.check_with(&argument.value, allow, locals)).collect();
-        let name = function.value.as_str();
-        let user = self.scope.get_mut(name).map(|entry| {
-            entry.n_uses += 1;
-            (entry.origin, entry.span)
-        });
-        let statement = match user {
-            Some((Origin::Function(statement), _)) => Some(statement),
-            Some((origin, defined)) => {
-                let what = origin.describe();
-                self.report(
-                    Diagnostic::error(D009, format!("`{name}` is not a function"))
-                        .at(function.span, format!("this is {what}"))
-                        .also(defined, "defined here")
-                        .found(what)
-                        .expected("a function"),
-                );
-                return None;
-            }
-            None => None,
-        };
-        if statement.is_none() && !BUILT_IN_FUNCTIONS.contains(&name) {
-            self.scope.note_undefined(name, function.span);
-            return None;
-        }
-        if let Some(argument) = arguments.iter().find_map(|argument| argument.name.as_ref()) {
-            self.report(
-                Diagnostic::error(D007, format!("`{name}` takes its arguments by place"))
-                    .at(argument.span, "a named argument")
-                    .found(format!("`{} = …`", argument.value))
-                    .expected("values only"),
-            );
-            return None;
-        }
-        let values: Vec<Expr> = checked.into_iter().collect::<Option<_>>()?;
-        match statement {
-            Some(statement) => self.user_function(statement, values, function.span, span, allow),
-            None => self.built_in(name, values, function.span, span),
-        }
-    }
-
-    fn user_function(
-        &mut self,
-        statement: &'a tree::Function,
-        values: Vec<Expr>,
-        name_span: Span,
-        span: Span,
-        allow: Allow,
-    ) -> Option<Expr> {
-        let name = &statement.name.value;
-        if !self.has_arguments(name, name_span, statement.parameters.len(), values.len()) {
-            return None;
-        }
-        if self.call_stack.contains(name) {
-            self.report(
-                Diagnostic::error(D006, format!("function `{name}` calls itself"))
-                    .at(name_span, "called from its own body")
-                    .also(statement.name.span, "defined here")
-                    .found("a function that calls itself")
-                    .expected("a function whose body ends in built-in functions"),
-            );
-            return None;
-        }
-        let locals: Locals = statement.parameters.iter().map(|p| p.value.clone()).zip(values).collect();
-        self.call_stack.push(name.clone());
-        let body = self.check_with(&statement.body, allow, &locals);
-        self.call_stack.pop();
-        body.map(|body| Expr { span, ..body })
-    }
-
-    fn has_arguments(&mut self, name: &str, span: Span, expected: usize, found: usize) -> bool {
-        if expected == found {
-            return true;
-        }
-        let plural = |n: usize| if n == 1 { "1 argument".to_owned() } else { format!("{n} arguments") };
-        self.report(
-            Diagnostic::error(D007, format!("`{name}` takes {}", plural(expected)))
-                .at(span, format!("called with {}", plural(found)))
-                .found(plural(found))
-                .expected(plural(expected)),
-        );
-        false
-    }
-
-    fn built_in(&mut self, name: &str, mut values: Vec<Expr>, name_span: Span, span: Span) -> Option<Expr> {
-        let unary = match name {
-            "exp" => Some(Unary::Exp),
-            "ln" => Some(Unary::Ln),
-            "log10" => Some(Unary::Log10),
-            "tanh" => Some(Unary::Tanh),
-            "erf" => Some(Unary::Erf),
-            "erfc" => Some(Unary::Erfc),
-            "sin" => Some(Unary::Sin),
-            "cos" => Some(Unary::Cos),
-            "sqrt" => Some(Unary::Sqrt),
-            "abs" => Some(Unary::Abs),
-            _ => None,
-        };
-        if unary.is_none() && !["min", "max", "pow"].contains(&name) {
-            self.report(
-                Diagnostic::error(D005, format!("`{name}` is known in `measure` only"))
-                    .at(name_span, "a norm of results")
-                    .found(format!("`{name}`"))
-                    .expected("a function of numbers"),
-            );
-            return None;
-        }
-        if !self.has_arguments(name, name_span, if unary.is_some() { 1 } else { 2 }, values.len()) {
-            return None;
-        }
-        let last = values.pop()?;
-        let Some(unary) = unary else { return self.built_in_pair(name, values.pop()?, last, span) };
-        let Some(dimension) = last.kind.dimension() else {
-            return self.wrong_kind(&format!("`{name}`"), "a number", last.kind, last.span);
-        };
-        let kind = match unary {
-            Unary::Abs => last.kind,
-            Unary::Sqrt => match dimension.power(1, 2) {
-                Some(root) => Type::Number(root),
-                None => return self.wrong_kind("`sqrt`", "a dimension with a root", last.kind, last.span),
-            },
-            _ if dimension.is_none() => Type::Number(dimension),
-            _ => {
-                self.report(
-                    Diagnostic::error(U102, format!("`{name}` needs a plain number"))
-                        .at(last.span, format!("this is {}", last.kind.describe()))
-                        .found(last.kind.describe())
-                        .expected("a plain number")
-                        .help("divide by a scale of the same dimension"),
-                );
-                return None;
-            }
-        };
-        Some(Expr::unary(unary, last, kind, span))
-    }
-
-    fn built_in_pair(&mut self, name: &str, a: Expr, b: Expr, span: Span) -> Option<Expr> {
-        if name == "pow" {
-            return self.power(a, b, span);
-        }
-        for side in [&a, &b] {
-            if side.kind == Type::Truth {
-                return self.wrong_kind(&format!("`{name}`"), "a number", side.kind, side.span);
-            }
-        }
-        let Some(kind) = a.kind.unify(b.kind) else { return self.mismatch(name, &a, &b, span) };
-        let operator = if name == "min" { Binary::Minimum } else { Binary::Maximum };
-        Some(Expr::binary(operator, a, b, kind, span))
-    }
-}
-
-/// The byte itself if it stands before an exponent mark, else `0`: `0e5` is zero, not too small.
-fn mantissa_byte(digits: &str, byte: u8) -> u8 {
-    let mantissa = digits.split(['e', 'E']).next().unwrap_or(digits);
-    if mantissa.bytes().any(|b| b == byte) { byte } else { b'0' }
 }

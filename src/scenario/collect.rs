@@ -211,10 +211,10 @@ fn build<'a>(
     let parameters = parameters(checker, statements);
     let domain = super::geometry::domain(checker, statements);
     let species = super::model::species(checker, statements);
-    let reactions = super::model::reactions(checker, statements, &species);
+    let reactions = super::reactions::reactions(checker, statements, &species);
     let flow = super::geometry::flow(checker, statements);
     let dispersion = super::geometry::dispersion(checker, statements);
-    let mixing = super::model::mixing(checker, statements);
+    let mixing = super::zones::mixing(checker, statements);
     let bins = super::geometry::bins(checker, statements);
     let particles = super::model::particles(checker, statements);
     let run = super::model::run(checker, statements);

@@ -3,6 +3,7 @@
 //! Owns the resolved types and the phase that builds them from the tree. May use the words, the
 //! catalogue and `syntax`. It deliberately decides nothing numerical: `plan` does.
 
+mod call;
 mod check;
 mod collect;
 pub mod expression;
@@ -10,9 +11,12 @@ mod geometry;
 mod measure;
 mod model;
 mod observe;
+mod quantity;
+mod reactions;
 mod reference;
 mod scope;
 mod slot;
+mod zones;
 
 use crate::source::{Span, Spanned};
 use crate::units::Dimension;

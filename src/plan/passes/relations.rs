@@ -117,7 +117,8 @@ fn express(form: &Affine, kept: &[usize], forms: &[Affine]) -> Option<Relation> 
     let solved = matrix.clone().svd(true, true).solve(&target, 1e-13 * matrix.amax()).ok()?;
     let factors: Vec<f64> = solved.iter().map(|factor| snap(*factor)).collect();
     let residual = (&matrix * nalgebra::DVector::from_vec(factors.clone()) - &target).amax();
-    if !(residual <= TOLERANCE * scale) {
+    // Not a number is no relation, too.
+    if residual.is_nan() || residual > TOLERANCE * scale {
         return None;
     }
     let constant = kept

@@ -52,7 +52,7 @@ fn is_species_list(words: &[&str]) -> bool {
 /// The clause `at` where it is the first after the species.
 fn first_clause_at(words: &[&str]) -> Option<usize> {
     let is_clause = |word: &&str| super::super::words::RESERVED_WORDS.contains(word);
-    words.iter().position(|word| is_clause(word)).filter(|&position| words[position] == "at")
+    words.iter().position(is_clause).filter(|&position| words[position] == "at")
 }
 
 /// The last token if it is a text.
