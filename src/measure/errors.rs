@@ -52,8 +52,10 @@ impl<'a> Comparison<'a> {
                 }
                 difference.add(observed.values[bin] - expected);
                 size.add(expected);
-                if let Some(standard_errors) = &observed.standard_errors {
-                    noise.add(standard_errors[bin]);
+                // A bin of one particle has no standard error.
+                let standard_error = observed.standard_errors.as_ref().map(|errors| errors[bin]);
+                if let Some(standard_error) = standard_error.filter(|error| !error.is_nan()) {
+                    noise.add(standard_error);
                 }
             }
         }

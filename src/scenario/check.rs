@@ -312,14 +312,21 @@ impl<'a> Checker<'a> {
             "-" => "subtract",
             _ => "compare",
         };
-        self.report(
-            Diagnostic::error(U101, format!("cannot {verb} values of different dimensions"))
-                .at(span, format!("`{sign}` needs the same dimension on both sides"))
-                .also(a.span, format!("this is {}", a.kind.describe()))
-                .also(b.span, format!("this is {}", b.kind.describe()))
-                .found(b.kind.describe())
-                .expected(a.kind.describe()),
-        );
+        let mut message = Diagnostic::error(U101, format!("cannot {verb} values of different dimensions"))
+            .at(span, format!("`{sign}` needs the same dimension on both sides"))
+            .also(a.span, format!("this is {}", a.kind.describe()))
+            .also(b.span, format!("this is {}", b.kind.describe()))
+            .found(b.kind.describe())
+            .expected(a.kind.describe());
+        for (bare, other) in [(a, b), (b, a)] {
+            if let (Some(value), Type::Number(Dimension::NONE), Type::Number(dimension)) =
+                (bare.value(), bare.kind, other.kind)
+            {
+                message = message
+                    .help(format!("if {value} has a unit, write it: `{value} {}`", dimension.unit_text()));
+            }
+        }
+        self.report(message);
         None
     }
 

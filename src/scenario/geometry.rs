@@ -310,16 +310,21 @@ pub(super) fn bins<'a>(
     grid(checker, &statement.counts, "the number of bins", span).map(Some)
 }
 
+/// One number of bins: written, or a dimensionless constant.
+pub(super) fn count_of<'a>(checker: &mut Checker<'a>, count: &'a tree::Expr, what: &str) -> Option<u64> {
+    let value = checker.slot(count, what, Dimension::NONE)?;
+    checker.count(value.value, what, MAX_BINS, value.span)
+}
+
 /// Counts such as `200 x 80`, one for each axis of the domain.
-pub(super) fn grid(
-    checker: &mut Checker<'_>,
-    counts: &[Spanned<f64>],
+pub(super) fn grid<'a>(
+    checker: &mut Checker<'a>,
+    counts: &'a [tree::Expr],
     what: &str,
     span: Span,
 ) -> Option<Spanned<Vec<usize>>> {
     let n_axes = checker.axes.len();
-    let values: Vec<Option<u64>> =
-        counts.iter().map(|count| checker.count(count.value, what, MAX_BINS, count.span)).collect();
+    let values: Vec<Option<u64>> = counts.iter().map(|count| count_of(checker, count, what)).collect();
     let values: Vec<u64> = values.into_iter().collect::<Option<_>>()?;
     let place = match (counts.first(), counts.last()) {
         (Some(first), Some(last)) => first.span.to(last.span),

@@ -2,7 +2,7 @@
 
 use super::check::Checker;
 use super::collect::Statements;
-use super::geometry::grid;
+use super::geometry::{count_of, grid};
 use super::model::species_index;
 use super::{Output, OutputKind};
 use crate::diagnostic::Diagnostic;
@@ -204,10 +204,10 @@ fn along(checker: &mut Checker<'_>, written: &tree::Output, kind: OutputKind) ->
     }
 }
 
-fn output_bins(
-    checker: &mut Checker<'_>,
+fn output_bins<'a>(
+    checker: &mut Checker<'a>,
     statements: &Statements<'_>,
-    written: &tree::Output,
+    written: &'a tree::Output,
     kind: OutputKind,
     along: Option<usize>,
     average: Option<&Spanned<Vec<usize>>>,
@@ -241,7 +241,7 @@ fn output_bins(
             );
             return None;
         }
-        let count = checker.count(written.grid[0].value, "the number of bins", 1e8, place)? as usize;
+        let count = count_of(checker, &written.grid[0], "the number of bins")? as usize;
         return Some(checker.axes.iter().map(|(_, index)| if *index == axis { count } else { 1 }).collect());
     }
     let Some(average) = average else {

@@ -74,7 +74,11 @@ impl Checker<'_> {
                     .found(format!("`{symbol}`"))
                     .expected("a unit such as `m`, `d`, `mol/L`");
                 let known: Vec<String> = units::known_symbols().collect();
-                if let Some(candidate) = did_you_mean(symbol, known.iter().map(String::as_str)) {
+                let (base, power) =
+                    symbol.split_at(symbol.trim_end_matches(|c: char| c.is_ascii_digit()).len());
+                if !power.is_empty() && units::is_unit_symbol(base) {
+                    message = message.help(format!("did you mean `{base}^{power}`?"));
+                } else if let Some(candidate) = did_you_mean(symbol, known.iter().map(String::as_str)) {
                     message = message.help(format!("did you mean `{candidate}`?"));
                 }
                 message

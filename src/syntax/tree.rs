@@ -215,7 +215,8 @@ pub struct Field {
 pub struct Average {
     /// `bins`
     pub kind: Name,
-    pub counts: Vec<Spanned<f64>>,
+    /// A number each, or a name of a dimensionless parameter.
+    pub counts: Vec<Expr>,
 }
 
 /// `A = …`
@@ -252,7 +253,7 @@ pub struct Output {
     /// `along y`
     pub along: Option<Name>,
     /// `on 200 x 80`
-    pub grid: Vec<Spanned<f64>>,
+    pub grid: Vec<Expr>,
     /// The text after `in`: a unit, as written.
     pub unit: Option<Spanned<String>>,
 }

@@ -47,11 +47,10 @@ impl Unit {
         loop {
             let (symbol_end, power, end) = read_term(text, position)?;
             let symbol = &text[position..symbol_end];
-            let factor = table::lookup(symbol).ok_or_else(|| UnitError::UnknownSymbol {
-                symbol: symbol.to_owned(),
-                start: position,
-                end: symbol_end,
-            })?;
+            let factor = table::lookup(symbol).ok_or_else(|| unknown(text, position))?;
+            if text[symbol_end..].starts_with(|c: char| c == '_' || c.is_ascii_digit()) {
+                return Err(unknown(text, position));
+            }
             unit = unit.times(factor, sign * power);
             let Some(joint) = text[end..].chars().next() else { return Ok(unit) };
             sign = match joint {
@@ -100,6 +99,13 @@ impl Unit {
     pub fn factor(&self) -> f64 {
         self.to_si("1").unwrap_or(f64::NAN)
     }
+}
+
+/// The word at `start`, which is no unit: up to the next joint or power.
+fn unknown(text: &str, start: usize) -> UnitError {
+    let rest = &text[start..];
+    let len = rest.find(['/', '·', '.', '^']).unwrap_or(rest.len());
+    UnitError::UnknownSymbol { symbol: rest[..len].to_owned(), start, end: start + len }
 }
 
 /// Reads `symbol` or `symbol^n` at `start`; returns the end of the symbol, the power and the end.
@@ -181,6 +187,14 @@ mod tests {
         assert_eq!(Unit::parse("m^99"), Err(UnitError::ExponentTooLarge { start: 1, end: 4 }));
         assert_eq!(Unit::parse(""), Err(UnitError::Malformed { start: 0, end: 0 }));
         assert!(Unit::parse("kmin").is_err());
+        assert_eq!(
+            Unit::parse("c0"),
+            Err(UnitError::UnknownSymbol { symbol: "c0".into(), start: 0, end: 2 })
+        );
+        assert_eq!(
+            Unit::parse("/m2"),
+            Err(UnitError::UnknownSymbol { symbol: "m2".into(), start: 1, end: 3 })
+        );
         assert_eq!(Unit::ONE.to_si("1e999"), None);
     }
 }

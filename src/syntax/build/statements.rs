@@ -10,8 +10,8 @@ use crate::source::{Span, Spanned};
 use crate::syntax::climb::Built;
 use crate::syntax::grammar::Rule;
 use crate::syntax::tree::{
-    Arrow, Assignment, Average, Axis, Boundary, Domain, Field, Flow, Function, Let, Measure, Output, Param,
-    Particles, Reaction, Reference, Run, Species, StatementKind, Target, Term, Times, Zone,
+    Arrow, Assignment, Average, Axis, Boundary, Domain, Expr, Field, Flow, Function, Let, Measure, Output,
+    Param, Particles, Reaction, Reference, Run, Species, StatementKind, Target, Term, Times, Zone,
 };
 use pest::iterators::Pair;
 
@@ -140,15 +140,23 @@ fn zone(parts: &mut Parts) -> Built<Zone> {
     Ok(Zone { name, fields })
 }
 
-fn counts(parts: &mut Parts) -> Built<Vec<Spanned<f64>>> {
+fn counts(parts: &mut Parts) -> Built<Vec<Expr>> {
     let pair = parts.need(Rule::counts)?;
     let mut parts = Parts::of(parts.place, pair);
     let mut counts = Vec::new();
-    while let Some(pair) = parts.take(Rule::bare_number) {
-        let value = pair.as_str().replace('_', "").parse().unwrap_or(f64::INFINITY);
-        counts.push(Spanned::new(value, span_at(parts.place, &pair)));
+    while let Some(pair) = parts.take(Rule::count) {
+        counts.push(count(parts.place, pair)?);
     }
     Ok(counts)
+}
+
+/// A bare number, or a name.
+fn count(place: Place, pair: Pair<Rule>) -> Built<Expr> {
+    let mut inner = Parts::of(place, pair);
+    match inner.take(Rule::bare_number) {
+        Some(number) => bare_number(place, number),
+        None => Ok(operand(place, inner.need(Rule::path)?)?.expr),
+    }
 }
 
 fn assignment(parts: &mut Parts) -> Built<Assignment> {
@@ -158,12 +166,7 @@ fn assignment(parts: &mut Parts) -> Built<Assignment> {
 fn particles(parts: &mut Parts) -> Built<Particles> {
     let kind = parts.wrapped_name(Rule::kind)?;
     let place = parts.place;
-    let count = parts.need(Rule::count)?;
-    let mut inner = Parts::of(place, count);
-    let count = match inner.take(Rule::bare_number) {
-        Some(number) => bare_number(place, number)?,
-        None => operand(place, inner.need(Rule::path)?)?.expr,
-    };
+    let count = count(place, parts.need(Rule::count)?)?;
     let placement = parts.take(Rule::placement).map(|pair| Parts::of(place, pair).name()).transpose()?;
     Ok(Particles { kind, count, placement })
 }
@@ -237,7 +240,7 @@ fn measure(parts: &mut Parts) -> Built<Measure> {
 struct Clauses {
     times: Once<Times>,
     along: Once<Spanned<String>>,
-    on: Once<Vec<Spanned<f64>>>,
+    on: Once<Vec<Expr>>,
     unit: Once<Spanned<String>>,
     over: Once<Axis>,
 }
