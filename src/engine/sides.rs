@@ -117,13 +117,13 @@ mod tests {
         positions[0]
     }
 
-    /// Unfolding: 3.3 lengths beyond the high side is 0.7 lengths from the low side, and so on.
+    /// By hand: 7.6 → −5.6 → 3.6 → −1.6 → −0.4, and so on.
     #[test]
     fn steps_far_beyond_the_domain_fold_back() {
         let rule = Rule::Reflect { low: -1.0, high: 1.0 };
         assert!((applied(rule, 1.5) - 0.5).abs() < 1e-15);
         assert!((applied(rule, -1.5) + 0.5).abs() < 1e-15);
-        assert!((applied(rule, 1.0 + 6.6) - 0.4).abs() < 1e-12);
+        assert!((applied(rule, 1.0 + 6.6) + 0.4).abs() < 1e-12);
         assert!((applied(rule, -1.0 - 8.5) + 0.5).abs() < 1e-12);
         assert_eq!(applied(rule, 0.25), 0.25);
         let around = Rule::Periodic { low: -1.0, high: 1.0 };

@@ -108,3 +108,108 @@ fn turn_single(word: u32) -> (f32, f32) {
     let cosine_sign = (quadrant.wrapping_add(1) & 2) << 30;
     (f32::from_bits(swapped_sine ^ sine_sign), f32::from_bits(swapped_cosine ^ cosine_sign))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::chacha;
+    use super::*;
+
+    const KEY: [u32; 8] = [3, 1, 4, 1, 5, 9, 2, 6];
+
+    fn singles(n_draws: u64) -> impl Iterator<Item = f64> {
+        (0..n_draws).flat_map(|number| {
+            let (mut words, mut normals) = ([0; DRAW], [0.0; DRAW]);
+            chacha::draw(&KEY, 0, number, &mut words);
+            single(&words, &mut normals);
+            normals
+        })
+    }
+
+    fn doubles(n_draws: u64) -> impl Iterator<Item = f64> {
+        (0..n_draws).flat_map(|number| {
+            let (mut high, mut low, mut normals) = ([0; DRAW], [0; DRAW], [0.0; DRAW]);
+            chacha::draw(&KEY, 0, 2 * number, &mut high);
+            chacha::draw(&KEY, 0, 2 * number + 1, &mut low);
+            double(&high, &low, &mut normals);
+            normals
+        })
+    }
+
+    /// Moments 1, 2, 4, 6 of a normal number are 0, 1, 3, 15; the variances of their samples are 1, 2,
+    /// 96 and 10170 over n. Four scatters are allowed.
+    fn check_moments(normals: impl Iterator<Item = f64>) {
+        let (mut n, mut sums, mut largest) = (0.0, [0.0; 4], 0.0_f64);
+        for x in normals {
+            let square = x * x;
+            n += 1.0;
+            for (sum, power) in sums.iter_mut().zip([x, square, square * square, square * square * square]) {
+                *sum += power;
+            }
+            largest = largest.max(x.abs());
+        }
+        for ((sum, moment), variance) in
+            sums.into_iter().zip([0.0, 1.0, 3.0, 15.0]).zip([1.0, 2.0, 96.0, 10170.0_f64])
+        {
+            assert!((sum / n - moment).abs() < 4.0 * (variance / n).sqrt(), "{moment}: {}", sum / n);
+        }
+        assert!((4.5..6.8).contains(&largest), "{largest}");
+    }
+
+    #[test]
+    fn moments_are_those_of_normal_numbers() {
+        check_moments(singles(4000));
+        check_moments(doubles(500));
+    }
+
+    /// Neighbours and the two halves of a pair are uncorrelated: four scatters of 1/√n.
+    #[test]
+    fn pairs_are_uncorrelated() {
+        let all: Vec<f64> = singles(2000).collect();
+        for lag in [1, 8, 64, PAIRS] {
+            let products = all.iter().zip(&all[lag..]).map(|(a, b)| a * b);
+            let n = (all.len() - lag) as f64;
+            assert!((products.sum::<f64>() / n).abs() < 4.0 / n.sqrt(), "lag {lag}");
+        }
+    }
+
+    /// The extremes of the words give finite numbers.
+    #[test]
+    fn extreme_words_stay_finite() {
+        for word in [0, 1, u32::MAX, 1 << 31, (1 << 31) - 1] {
+            let mut normals = [f64::NAN; DRAW];
+            single(&[word; DRAW], &mut normals);
+            assert!(normals.iter().all(|x| x.abs() < 6.67), "{word}: {}", normals[0]);
+            double(&[word; DRAW], &[word; DRAW], &mut normals);
+            assert!(normals.iter().all(|x| x.abs() < 8.67), "{word}: {}", normals[0]);
+        }
+    }
+
+    /// Against the 64-bit library: a few units of the last place of 32-bit numbers.
+    #[test]
+    fn functions_are_as_right_as_their_numbers() {
+        for k in 0..100_000_u32 {
+            let word = k.wrapping_mul(2_654_435_761);
+            let angle = f64::from(word as i32) * (std::f64::consts::TAU / 4_294_967_296.0);
+            let (sine, cosine) = turn_single(word);
+            assert!((f64::from(sine) - scalar::sin(angle)).abs() < 1.5e-7, "{word}");
+            assert!((f64::from(cosine) - scalar::cos(angle)).abs() < 1.5e-7, "{word}");
+            let x = ((word >> 1) as i32 as f32 + 0.5) * (1.0 / 2_147_483_648.0);
+            let exact = scalar::ln(f64::from(x));
+            assert!((f64::from(ln_single(x)) - exact).abs() <= 1.5e-7 * exact.abs(), "{x}");
+        }
+    }
+
+    /// The first numbers for ever: a change here is a change of `NUMERICS_VERSION`.
+    #[test]
+    fn first_numbers_are_pinned() {
+        let hash = |normals: &mut dyn Iterator<Item = f64>| {
+            let mut hasher = blake3::Hasher::new();
+            normals.for_each(|x| {
+                hasher.update(&x.to_bits().to_le_bytes());
+            });
+            hasher.finalize().to_hex().as_str()[..16].to_owned()
+        };
+        assert_eq!(hash(&mut singles(2)), "84a04859ffe53aec");
+        assert_eq!(hash(&mut doubles(2)), "6be3013d931ad762");
+    }
+}
