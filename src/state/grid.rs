@@ -63,8 +63,8 @@ impl<const D: usize> Grid<D> {
                 if along < last[axis] { along } else { last[axis] }
             };
             let mut bin = if D > 0 { along(0) } else { 0.0 };
-            for axis in 1..D {
-                bin = bin * (last[axis] + 1.0) + along(axis);
+            for (axis, last) in last.iter().enumerate().skip(1) {
+                bin = bin * (last + 1.0) + along(axis);
             }
             *slot = low_bits(bin);
         }

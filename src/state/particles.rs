@@ -50,8 +50,13 @@ impl<const D: usize> Block<D> {
 
     /// Ranges of the chunks within the block.
     pub fn chunks(&self) -> impl Iterator<Item = std::ops::Range<usize>> + use<D> {
+        self.portions(CHUNK)
+    }
+
+    /// Ranges of `size` particles, the last one shorter.
+    pub fn portions(&self, size: usize) -> impl Iterator<Item = std::ops::Range<usize>> + use<D> {
         let n_particles = self.n_particles;
-        (0..n_particles).step_by(CHUNK).map(move |start| start..(start + CHUNK).min(n_particles))
+        (0..n_particles).step_by(size).map(move |start| start..(start + size).min(n_particles))
     }
 }
 

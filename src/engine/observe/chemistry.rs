@@ -4,31 +4,84 @@
 //! carried: reactions act on the unreacted concentrations when somebody looks.
 
 use super::super::program::Program;
-use crate::plan::InstantReaction;
+use crate::plan::{InstantReaction, OutputKind, Plan, Quantity};
 use crate::state::particles::CHUNK;
 
-/// Unreacted concentrations of all species of a chunk, then the reactions.
+/// Particles whose extents are held at once.
+const PART: usize = 64;
+
+/// Which concentrations somebody looks at.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Needs {
+    pub unreacted: Vec<bool>,
+    pub reacted: Vec<bool>,
+    reactions: Vec<bool>,
+}
+
+impl Needs {
+    /// Of these outputs. Mixing is made of components alone.
+    pub fn of(plan: &Plan, outputs: &[usize]) -> Self {
+        let n_species = plan.species.len();
+        let (mut unreacted, mut reacted) = (vec![false; n_species], vec![false; n_species]);
+        for output in outputs.iter().map(|&idx| &plan.outputs[idx]) {
+            match output.kind {
+                OutputKind::Particles => reacted.fill(true),
+                OutputKind::Mixing => {}
+                OutputKind::Profile | OutputKind::Map | OutputKind::Total | OutputKind::Covariance => {
+                    for quantity in &output.quantities {
+                        match *quantity {
+                            Quantity::Species(idx) => reacted[idx] = true,
+                            Quantity::Pair(a, b) => [a, b].iter().for_each(|&idx| unreacted[idx] = true),
+                        }
+                    }
+                }
+            }
+        }
+        let touches = |reaction: &InstantReaction| {
+            reaction.reactants.iter().chain(&reaction.products).any(|&(species, _)| reacted[species])
+        };
+        let reactions: Vec<bool> = plan.reactions.iter().map(touches).collect();
+        for (reaction, _) in plan.reactions.iter().zip(&reactions).filter(|&(_, &is_needed)| is_needed) {
+            reaction.reactants.iter().for_each(|&(species, _)| unreacted[species] = true);
+        }
+        unreacted.iter_mut().zip(&reacted).for_each(|(unreacted, reacted)| *unreacted |= reacted);
+        Self { unreacted, reacted, reactions }
+    }
+
+    /// Whether any concentration is needed.
+    pub fn any(&self) -> bool {
+        self.unreacted.contains(&true)
+    }
+}
+
+/// The needed concentrations of a chunk: unreacted, then reacted.
 #[inline(always)]
 pub fn speciate<const D: usize>(
     program: &Program<D>,
+    needs: &Needs,
     n: usize,
     components: &[[f64; CHUNK]],
     unreacted: &mut [[f64; CHUNK]],
     species: &mut [[f64; CHUNK]],
 ) {
-    for (target, recipe) in unreacted.iter_mut().zip(&program.plan.species) {
-        target[..n].fill(recipe.constant);
+    for (idx, recipe) in program.plan.species.iter().enumerate().filter(|&(idx, _)| needs.unreacted[idx]) {
+        let target = &mut unreacted[idx][..n];
+        target.fill(recipe.constant);
         for &(component, coefficient) in &recipe.terms {
-            for (target, value) in target[..n].iter_mut().zip(&components[component]) {
+            for (target, value) in target.iter_mut().zip(&components[component]) {
                 *target += coefficient * value;
             }
         }
+        if needs.reacted[idx] {
+            species[idx][..n].copy_from_slice(&unreacted[idx][..n]);
+        }
     }
-    for (target, source) in species.iter_mut().zip(unreacted.iter()) {
-        target[..n].copy_from_slice(&source[..n]);
-    }
-    for reaction in &program.plan.reactions {
-        react(reaction, n, unreacted, species);
+    for (reaction, _) in
+        program.plan.reactions.iter().zip(&needs.reactions).filter(|&(_, &is_needed)| is_needed)
+    {
+        for start in (0..n).step_by(PART) {
+            react(reaction, needs, start..(start + PART).min(n), unreacted, species);
+        }
     }
 }
 
@@ -38,24 +91,38 @@ pub fn speciate<const D: usize>(
 /// - Symbols: `U` unreacted, `C` reacted concentration, `ν` coefficient, `ξ` extent.
 /// - Range: `U ≥ 0`; then `C ≥ 0`, up to rounding.
 /// - Source: the limit of infinite rate; methods, section 7.6 for `A + B → AB`.
-/// - Shape: one chunk.
+/// - Shape: at most 64 particles.
 #[inline(always)]
-fn react(reaction: &InstantReaction, n: usize, unreacted: &[[f64; CHUNK]], species: &mut [[f64; CHUNK]]) {
-    let mut extent = [f64::INFINITY; CHUNK];
+fn react(
+    reaction: &InstantReaction,
+    needs: &Needs,
+    range: std::ops::Range<usize>,
+    unreacted: &[[f64; CHUNK]],
+    species: &mut [[f64; CHUNK]],
+) {
+    let mut extents = [f64::INFINITY; PART];
     for &(reactant, coefficient) in &reaction.reactants {
-        for (extent, value) in extent[..n].iter_mut().zip(&unreacted[reactant]) {
-            let own = value / coefficient;
-            *extent = if own < *extent { own } else { *extent };
+        let values = unreacted[reactant][range.clone()].iter();
+        // A division is dear and by 1 it changes nothing.
+        if coefficient == 1.0 {
+            lower(&mut extents, values.copied());
+        } else {
+            lower(&mut extents, values.map(|value| value / coefficient));
         }
     }
-    for &(reactant, coefficient) in &reaction.reactants {
-        for (target, extent) in species[reactant][..n].iter_mut().zip(&extent) {
-            *target -= coefficient * extent;
+    let consumed = reaction.reactants.iter().map(|&(species, coefficient)| (species, -coefficient));
+    for (idx, coefficient) in consumed.chain(reaction.products.iter().copied()) {
+        if needs.reacted[idx] {
+            for (target, extent) in species[idx][range.clone()].iter_mut().zip(&extents) {
+                *target += coefficient * extent;
+            }
         }
     }
-    for &(product, coefficient) in &reaction.products {
-        for (target, extent) in species[product][..n].iter_mut().zip(&extent) {
-            *target += coefficient * extent;
-        }
+}
+
+#[inline(always)]
+fn lower(extents: &mut [f64; PART], values: impl Iterator<Item = f64>) {
+    for (extent, value) in extents.iter_mut().zip(values) {
+        *extent = if value < *extent { value } else { *extent };
     }
 }

@@ -9,6 +9,7 @@ use super::super::program::{Program, Term};
 use super::super::run::Run;
 use super::super::step::Scratch;
 use super::super::walk::{Leap, Noise, Place};
+use super::chemistry::{Needs, speciate};
 use crate::state::particles::{Block, CHUNK};
 use std::ops::Range;
 
@@ -31,6 +32,15 @@ pub struct Between<const D: usize> {
 }
 
 impl<const D: usize> Instant<D> {
+    /// Particles that are looked at together: little enough for the first-level cache, but whole
+    /// chunks where random numbers are drawn.
+    pub fn portion(&self) -> usize {
+        match self {
+            Self::Now => CHUNK / 4,
+            Self::Between(_) => CHUNK,
+        }
+    }
+
     /// The instant `fraction` of the way into step `step` of length `dt`.
     pub fn between(program: &Program<D>, step: u64, fraction: f64, t: f64, dt: f64) -> Self {
         let mover = &program.mover;
@@ -158,6 +168,7 @@ pub struct Resolve<'a, const D: usize> {
     pub instant: &'a Instant<D>,
     pub means: &'a Means,
     pub limits: &'a [f64],
+    pub needs: &'a Needs,
     pub lab: &'a mut Lab<D>,
 }
 
@@ -166,7 +177,7 @@ impl<const D: usize> pulp::NullaryFnOnce for Resolve<'_, D> {
 
     #[inline(always)]
     fn call(self) {
-        let Self { program, instant, means, limits, lab } = self;
+        let Self { program, instant, means, limits, needs, lab } = self;
         let n = lab.n;
         if let Instant::Between(between) = instant {
             let mut columns = mix::cut(&mut lab.columns, 0..n);
@@ -185,7 +196,10 @@ impl<const D: usize> pulp::NullaryFnOnce for Resolve<'_, D> {
         for component in 0..program.n_components() {
             let columns = &lab.columns[component * n_slots..][..n_slots];
             weighted(&program.mean_weights, columns, &mut lab.simulated[component]);
-            if program.has_mixing() {
+            if !needs.any() {
+                continue;
+            }
+            if program.terms.iter().any(|term| matches!(term, Term::Mean { .. })) {
                 let own = &lab.simulated[component][..n];
                 mix::gather(
                     program,
@@ -198,7 +212,7 @@ impl<const D: usize> pulp::NullaryFnOnce for Resolve<'_, D> {
             let (mixed, target) = (&lab.mixed[component], &mut lab.components[component]);
             total(&program.terms, columns, mixed, &mut target[..n]);
         }
-        super::chemistry::speciate(program, n, &lab.components, &mut lab.unreacted, &mut lab.species);
+        speciate(program, needs, n, &lab.components, &mut lab.unreacted, &mut lab.species);
     }
 }
 

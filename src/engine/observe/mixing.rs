@@ -11,6 +11,10 @@ use super::tally::{lane_sum, pairs};
 use crate::plan::Output;
 use crate::state::grid::Grid;
 use crate::state::particles::CHUNK;
+use std::ops::Range;
+
+/// Particles whose products are held at once.
+const PART: usize = 64;
 
 /// Mixing of the pairs of one output, within the bins that `means` are of.
 ///
@@ -22,8 +26,8 @@ pub struct Mixing<'a, const D: usize> {
     /// Bins other than those of the averages.
     grid: Option<&'a Grid<D>>,
     means: &'a Means,
-    /// Per bin `n / (n − 1)`, or 0 where there is no covariance.
-    weights: Vec<f64>,
+    /// Per bin `n / (n − 1)` and `1 / (n − 1)`, or 0 where there is no covariance and outside.
+    weights: Vec<[f64; 2]>,
     /// Pairs of components whose sums are needed.
     products: Vec<(usize, usize)>,
     recipes: Vec<Recipe>,
@@ -53,9 +57,9 @@ impl<'a, const D: usize> Mixing<'a, D> {
         products.sort_unstable();
         products.dedup();
         let n_bins = means.counts.len() - 1;
-        let weight = |&n: &f64| if n > 1.0 { n / (n - 1.0) } else { 0.0 };
-        let mut weights: Vec<f64> = means.counts[..n_bins].iter().map(weight).collect();
-        weights.push(0.0);
+        let weight = |&n: &f64| if n > 1.0 { [n / (n - 1.0), 1.0 / (n - 1.0)] } else { [0.0; 2] };
+        let mut weights: Vec<[f64; 2]> = means.counts[..n_bins].iter().map(weight).collect();
+        weights.push([0.0; 2]);
         let volume = program.plan.particles.volume;
         Self { grid, means, weights, products, recipes, volume, carried_fraction: program.carried_fraction }
     }
@@ -75,28 +79,37 @@ impl<'a, const D: usize> Mixing<'a, D> {
             }
             None => lab.slots(),
         };
-        let deviation = |component: usize, target: &mut [f64; CHUNK]| {
-            let means = &self.means.mixed[component];
-            for ((target, &slot), value) in target.iter_mut().zip(slots).zip(&lab.simulated[component]) {
-                *target = value - means[slot as usize];
-            }
-        };
-        let (mut a, mut b) = ([0.0; CHUNK], [0.0; CHUNK]);
         for (&(k, l), sums) in self.products.iter().zip(sums.as_chunks_mut::<2>().0) {
-            deviation(k, &mut a);
-            if k == l {
-                b = a;
-            } else {
-                deviation(l, &mut b);
+            for start in (0..lab.n).step_by(PART) {
+                let range = start..(start + PART).min(lab.n);
+                let [weighted, biased] = self.products_of(k, l, &slots[range.clone()], lab, range);
+                sums[0] += lane_sum(&weighted);
+                sums[1] += lane_sum(&biased);
             }
-            for ((a, b), &slot) in a.iter_mut().zip(&mut b).zip(slots) {
-                let product = *a * *b * self.weights[slot as usize];
-                *a = product;
-                *b = if product == 0.0 { 0.0 } else { product / self.means.counts[slot as usize] };
-            }
-            sums[0] += lane_sum(&a[..lab.n]);
-            sums[1] += lane_sum(&b[..lab.n]);
         }
+    }
+
+    /// Products of two deviations, times both weights of their bin.
+    fn products_of(
+        &self,
+        k: usize,
+        l: usize,
+        slots: &[i32],
+        lab: &Lab<D>,
+        range: Range<usize>,
+    ) -> [[f64; PART]; 2] {
+        let mut both = [[0.0; PART]; 2];
+        let [weighted, biased] = &mut both;
+        let (a, b) = (&lab.simulated[k][range.clone()], &lab.simulated[l][range]);
+        let (mean_a, mean_b) = (&self.means.mixed[k], &self.means.mixed[l]);
+        for (idx, ((&slot, a), b)) in slots.iter().zip(a).zip(b).enumerate() {
+            let slot = slot as usize;
+            let product = (a - mean_a[slot]) * (b - mean_b[slot]);
+            let [weight, bias] = self.weights[slot];
+            weighted[idx] = product * weight;
+            biased[idx] = product * bias;
+        }
+        both
     }
 
     /// The measures of each pair.

@@ -18,6 +18,7 @@ use super::snapshot::{Snapshot, Values};
 use crate::plan::{Output, OutputKind, Quantity};
 use crate::state::grid::Grid;
 use crate::state::particles::{Block, CHUNK, state_bytes};
+use chemistry::Needs;
 pub use lab::{Instant, Lab};
 use lab::{Load, Resolve};
 use mixing::Mixing;
@@ -52,7 +53,8 @@ pub fn observe<const D: usize>(
         });
         tallies.push(Tally::new(program, output, mixing).ok_or_else(bad_bins)?);
     }
-    let values = sum(run, instant, &means, &tallies);
+    let needs = Needs::of(program.plan, &due.outputs);
+    let values = sum(run, instant, &means, &needs, &tallies);
     let snapshot = |(&output_idx, values)| Snapshot {
         output_idx,
         t: due.t,
@@ -88,6 +90,7 @@ fn sum<const D: usize>(
     run: &Run<D>,
     instant: &Instant<D>,
     means: &Means,
+    needs: &Needs,
     tallies: &[Tally<D>],
 ) -> Vec<Values> {
     let first_at = offsets(tallies, |tally| tally.n_first());
@@ -95,7 +98,7 @@ fn sum<const D: usize>(
     let (n_first, n_second) = (first_at[tallies.len()], second_at[tallies.len()]);
     let mut first = Vec::new();
     if tallies.iter().any(|tally| !matches!(tally, Tally::Particles)) {
-        first = sweep(run, instant, Some(means), n_first, &|lab, sums| {
+        first = sweep(run, instant, Some((means, needs)), n_first, &|lab, sums| {
             for (idx, tally) in tallies.iter().enumerate() {
                 tally.add_first(lab, &mut sums[first_at[idx]..first_at[idx + 1]]);
             }
@@ -103,7 +106,7 @@ fn sum<const D: usize>(
     }
     let mut second = Vec::new();
     if n_second > 0 {
-        second = sweep(run, instant, Some(means), n_second, &|lab, sums| {
+        second = sweep(run, instant, Some((means, needs)), n_second, &|lab, sums| {
             for (idx, tally) in tallies.iter().enumerate() {
                 let first = &first[first_at[idx]..first_at[idx + 1]];
                 tally.add_second(lab, first, &mut sums[second_at[idx]..second_at[idx + 1]]);
@@ -113,7 +116,7 @@ fn sum<const D: usize>(
     let values = tallies.iter().enumerate().map(|(idx, tally)| {
         let first = first.get(first_at[idx]..first_at[idx + 1]).unwrap_or_default();
         let second = second.get(second_at[idx]..second_at[idx + 1]).unwrap_or_default();
-        tally.values(&run.program, first, second).unwrap_or_else(|| particles(run, instant, means))
+        tally.values(&run.program, first, second).unwrap_or_else(|| particles(run, instant, means, needs))
     });
     values.collect()
 }
@@ -145,7 +148,7 @@ fn average<const D: usize>(run: &Run<D>, instant: &Instant<D>, grid: &Grid<D>) -
 fn sweep<const D: usize>(
     run: &Run<D>,
     instant: &Instant<D>,
-    means: Option<&Means>,
+    resolved: Option<(&Means, &Needs)>,
     n_sums: usize,
     add: &(dyn Fn(&Lab<D>, &mut [f64]) + Sync),
 ) -> Vec<f64> {
@@ -159,8 +162,8 @@ fn sweep<const D: usize>(
             || Lab::new(&run.program),
             |lab| {
                 for block in groups[group_idx] {
-                    for range in block.chunks() {
-                        load(run, instant, means, block, range, lab);
+                    for range in block.portions(instant.portion()) {
+                        load(run, instant, resolved, block, range, lab);
                         add(lab, &mut sums);
                     }
                 }
@@ -179,19 +182,19 @@ fn sweep<const D: usize>(
 fn load<const D: usize>(
     run: &Run<D>,
     instant: &Instant<D>,
-    means: Option<&Means>,
+    resolved: Option<(&Means, &Needs)>,
     block: &Block<D>,
     range: Range<usize>,
     lab: &mut Lab<D>,
 ) {
     run.width.run(Load { run, instant, block, range, lab });
-    if let Some(means) = means {
-        run.width.run(Resolve { program: &run.program, instant, means, limits: &run.limits, lab });
+    if let Some((means, needs)) = resolved {
+        run.width.run(Resolve { program: &run.program, instant, means, limits: &run.limits, needs, lab });
     }
 }
 
 /// Every particle, in order.
-fn particles<const D: usize>(run: &Run<D>, instant: &Instant<D>, means: &Means) -> Values {
+fn particles<const D: usize>(run: &Run<D>, instant: &Instant<D>, means: &Means, needs: &Needs) -> Values {
     let n_species = run.program.plan.species.len();
     let of_block = |block_idx: usize| {
         let block = &run.blocks[block_idx];
@@ -199,8 +202,8 @@ fn particles<const D: usize>(run: &Run<D>, instant: &Instant<D>, means: &Means) 
         run.labs.lend(
             || Lab::new(&run.program),
             |lab| {
-                for range in block.chunks() {
-                    load(run, instant, Some(means), block, range, lab);
+                for range in block.portions(instant.portion()) {
+                    load(run, instant, Some((means, needs)), block, range, lab);
                     let sources = lab.positions.iter().chain(&lab.species);
                     columns
                         .iter_mut()
