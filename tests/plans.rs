@@ -1,6 +1,6 @@
 //! The plan: what changes its hash, what is left out and why, and what passes may not change.
 
-use lamella::plan::compile::{Compiled, Options};
+use lamella::plan::compile::{Compiled, Options, Selection};
 use lamella::plan::{Stage, document};
 use lamella::scenario::Settings;
 use lamella::source::Sources;
@@ -22,7 +22,7 @@ fn compile(text: &str) -> Compiled {
 }
 
 fn without_passes(text: &str) -> Compiled {
-    compile_with(text, &Settings::default(), &Options { without_passes: true, memory: None })
+    compile_with(text, &Settings::default(), &Options { passes: Selection::None, memory: None })
 }
 
 /// The column with one piece of text replaced; the piece must be there.
@@ -201,7 +201,7 @@ fn limits_refuse_at_the_line_with_what_would_work() {
     let large = lamella::check(
         Sources::single("scene.lam", edited("1_000_000", "1e10")),
         &Settings::default(),
-        &Options { without_passes: false, memory: Some(1 << 30) },
+        &Options { passes: Selection::All, memory: Some(1 << 30) },
     );
     assert!(large.compiled.is_none() && large.diagnostics.iter().any(|d| d.code.0 == "N301"));
 }

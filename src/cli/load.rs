@@ -3,7 +3,7 @@
 use super::files::{display_name, read_scene};
 use super::{Stopped, machine};
 use lamella::Checked;
-use lamella::plan::compile::Options;
+use lamella::plan::compile::{Options, Selection};
 use lamella::scenario::Settings;
 use lamella::source::Sources;
 use std::path::Path;
@@ -11,7 +11,8 @@ use std::path::Path;
 /// Reads a scene and takes it as far as it goes.
 pub(crate) fn load(path: &Path, settings: &Settings, without_passes: bool) -> Result<Checked, Stopped> {
     let text = read_scene(path)?;
-    let options = Options { without_passes, memory: machine::available_memory() };
+    let passes = if without_passes { Selection::None } else { Selection::All };
+    let options = Options { passes, memory: machine::available_memory() };
     Ok(lamella::check(Sources::single(display_name(path), text), settings, &options))
 }
 

@@ -12,10 +12,30 @@ use crate::scenario::Scenario;
 /// How to compile.
 #[derive(Debug, Clone, Default)]
 pub struct Options {
-    /// Leave nothing out; the tables must not change where the passes only drop or fuse.
-    pub without_passes: bool,
+    pub passes: Selection,
     /// Bytes that a run may use; `None` leaves memory unchecked.
     pub memory: Option<u64>,
+}
+
+/// Which passes run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Selection {
+    #[default]
+    All,
+    /// Those that only drop and fuse: the tables are the same, byte by byte.
+    KeepingBytes,
+    /// None: everything that the scene says is run as it is said.
+    None,
+}
+
+impl Selection {
+    fn takes(self, pass: &passes::Pass) -> bool {
+        match self {
+            Selection::All => true,
+            Selection::KeepingBytes => pass.keeps_bytes,
+            Selection::None => false,
+        }
+    }
 }
 
 /// A frozen plan and what can be told about it.
@@ -40,7 +60,7 @@ pub fn compile(scenario: &Scenario, options: &Options) -> (Option<Compiled>, Vec
     if let Err(reason) = draft.plan.check() {
         panic!("lowering made a plan that is not well-formed: {reason}");
     }
-    passes::run(&mut draft, |_| !options.without_passes);
+    passes::run(&mut draft, |pass| options.passes.takes(pass));
     let cost = cost::estimate(&draft.plan);
     let (limits, diagnostics) = limits::check(scenario, &draft, &cost, options.memory);
     if crate::diagnostic::any_fatal(&diagnostics) {

@@ -15,7 +15,7 @@ mod lower;
 pub mod passes;
 pub mod tape;
 
-pub use compile::{Compiled, Options, compile, hash};
+pub use compile::{Compiled, Options, Selection, compile, hash};
 
 use serde::{Deserialize, Serialize};
 use tape::Tape;

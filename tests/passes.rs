@@ -1,0 +1,159 @@
+//! Proof of omission: every scene gives the same numbers with and without the passes.
+//!
+//! Passes that only drop and fuse keep every bit. Those that replace arithmetic by an equivalent
+//! (a conservation relation, fractions added before they multiply) change the last bits only.
+
+use lamella::engine::snapshot::{Snapshot, Values};
+use lamella::engine::{Settings as EngineSettings, Unattended};
+use lamella::plan::compile::{Compiled, Options, Selection};
+use lamella::scenario::Settings;
+use lamella::source::Sources;
+
+/// A scene with few particles and few steps: the proof needs no accuracy.
+fn small(text: &str) -> String {
+    let mut lines = Vec::new();
+    for line in text.lines() {
+        let line = if line.starts_with("particles fluid") {
+            let placement = if line.contains("stratified") { " stratified" } else { "" };
+            format!("particles fluid 30_000{placement}")
+        } else {
+            line.to_owned()
+        };
+        lines.push(line);
+    }
+    lines.join("\n").replace("average bins 1500", "average bins 150")
+}
+
+fn compile(text: &str, passes: Selection) -> Compiled {
+    let checked = lamella::check(
+        Sources::single("scene.lam", text),
+        &Settings::default(),
+        &Options { passes, memory: None },
+    );
+    checked.compiled.unwrap_or_else(|| panic!("no plan: {:#?}", checked.diagnostics))
+}
+
+/// The snapshots of the first steps.
+fn run(compiled: &Compiled) -> Vec<Snapshot> {
+    let mut plan = compiled.plan.clone();
+    plan.time.n_steps = plan.time.n_steps.min(30);
+    plan.time.duration = plan.time.duration.min(30.0 * plan.time.step);
+    let end = plan.time.duration;
+    for output in &mut plan.outputs {
+        // A time on the steps, one between two steps, and the end.
+        output.times = vec![0.0, 3.0 * plan.time.step, 10.3 * plan.time.step, end];
+        output.times.retain(|t| *t <= end);
+        output.times.dedup();
+    }
+    let mut snapshots = Vec::new();
+    let settings = EngineSettings { threads: Some(2), ..EngineSettings::default() };
+    lamella::engine::run(&plan, &settings, &Unattended, &mut |snapshot| {
+        snapshots.push(snapshot);
+        Ok(())
+    })
+    .expect("the scene runs");
+    snapshots
+}
+
+fn columns(values: &Values) -> Vec<Vec<f64>> {
+    match values {
+        Values::Binned { mean, standard_error, n_particles } => {
+            let counts = n_particles.iter().map(|n| *n as f64).collect();
+            mean.iter().chain(standard_error).cloned().chain([counts]).collect()
+        }
+        Values::Covariance { covariance, n_particles } => {
+            covariance.iter().cloned().chain([n_particles.iter().map(|n| *n as f64).collect()]).collect()
+        }
+        Values::Total { amount } => vec![amount.clone()],
+        Values::Mixing(states) => states.iter().map(|s| vec![s.m, s.m_mean, s.m_cov, s.gamma]).collect(),
+        Values::Particles { positions, concentrations } => {
+            positions.iter().chain(concentrations).cloned().collect()
+        }
+    }
+}
+
+/// Largest difference, relative to the largest value of its column; bits if `exactly`.
+fn assert_same(a: &[Snapshot], b: &[Snapshot], tolerance: f64, scene: &str) {
+    assert_eq!(a.len(), b.len(), "{scene}: number of snapshots");
+    for (a, b) in a.iter().zip(b) {
+        assert_eq!((a.output_idx, a.t), (b.output_idx, b.t), "{scene}");
+        for (column_idx, (left, right)) in columns(&a.values).iter().zip(columns(&b.values)).enumerate() {
+            let scale = left.iter().filter(|v| v.is_finite()).fold(0.0_f64, |m, v| m.max(v.abs()));
+            for (idx, (x, y)) in left.iter().zip(&right).enumerate() {
+                let is_same = if tolerance == 0.0 {
+                    x.to_bits() == y.to_bits() || (x.is_nan() && y.is_nan()) || x == y
+                } else {
+                    (x - y).abs() <= tolerance * scale || (x.is_nan() && y.is_nan())
+                };
+                assert!(
+                    is_same,
+                    "{scene}: output {} at {} s, column {column_idx}, place {idx}: {x:e} and {y:e}",
+                    a.output_idx, a.t
+                );
+            }
+        }
+    }
+}
+
+fn scenes() -> Vec<(String, String)> {
+    let mut scenes = Vec::new();
+    for root in ["experiments", "tests/scenes"] {
+        let mut folders = vec![std::path::PathBuf::from(env!("CARGO_MANIFEST_DIR")).join(root)];
+        while let Some(folder) = folders.pop() {
+            let mut entries: Vec<_> = std::fs::read_dir(&folder)
+                .expect("a folder")
+                .map(|entry| entry.expect("an entry").path())
+                .collect();
+            entries.sort();
+            for path in entries {
+                if path.is_dir() {
+                    folders.push(path);
+                } else if path.extension().is_some_and(|extension| extension == "lam") {
+                    let text = std::fs::read_to_string(&path).expect("a scene");
+                    scenes.push((path.display().to_string(), text));
+                }
+            }
+        }
+    }
+    assert!(scenes.len() >= 9, "the shipped scenes are found");
+    scenes
+}
+
+#[test]
+fn passes_that_drop_and_fuse_keep_every_bit() {
+    for (name, text) in scenes() {
+        let text = small(&text);
+        let literal = run(&compile(&text, Selection::None));
+        let lean = run(&compile(&text, Selection::KeepingBytes));
+        assert_same(&literal, &lean, 0.0, &name);
+    }
+}
+
+/// A conservation relation replaces a carried field by `α + β U`: one rounding at output instead of
+/// one in each step. 30 steps of relative size 2⁻⁵³ stay far below 1e-13; covariances subtract
+/// nearly equal numbers and keep three figures less.
+#[test]
+fn passes_that_replace_arithmetic_change_the_last_bits_only() {
+    for (name, text) in scenes() {
+        let text = small(&text);
+        let literal = compile(&text, Selection::KeepingBytes);
+        let lean = compile(&text, Selection::All);
+        if literal.plan.axes.len() != lean.plan.axes.len() {
+            continue;
+        }
+        assert_same(&run(&literal), &run(&lean), 1e-10, &name);
+    }
+}
+
+#[test]
+fn unused_things_are_left_out_of_the_run() {
+    let column = small(include_str!("../experiments/gramling/gramling.lam"));
+    let crowded = column
+        .replace("species AB", "species C, E\nspecies AB")
+        .replace("  slow:", "  none: fraction 0, rate 3e-4 /s\n  slow:")
+        + "\ninitial C = A * A / c0\ninitial E = 2 * A\noutput total AB every 10 s\n";
+    let plain = compile(&column, Selection::All);
+    let crowded = compile(&crowded, Selection::All);
+    assert_eq!(plain.hash, crowded.hash);
+    assert!(crowded.left_out.len() > plain.left_out.len());
+}
