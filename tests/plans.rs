@@ -193,8 +193,8 @@ fn limits_refuse_at_the_line_with_what_would_work() {
     let refusal = checked.diagnostics.iter().find(|d| d.code.0 == "N202").expect("refused");
     let span = refusal.primary_span().expect("a place");
     assert_eq!(checked.sources.slice(span), "3000 s");
-    assert!(refusal.help[0].contains("2.000e2 s"), "{:?}", refusal.help);
-    let works = messages(&coarse.replace("step 3000 s", "step 2.000e2 s"));
+    assert!(refusal.help[0].contains("step 200 s"), "{:?}", refusal.help);
+    let works = messages(&coarse.replace("step 3000 s", "step 200 s"));
     assert!(works.compiled.is_some(), "the step of the help works: {:?}", works.diagnostics);
     let few = messages(&edited("1_000_000", "500"));
     assert!(few.diagnostics.iter().any(|d| d.code.0 == "N201"), "{:?}", few.diagnostics);
