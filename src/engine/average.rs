@@ -10,24 +10,27 @@ use std::ops::Range;
 /// Most groups of blocks that have sums of their own.
 const MAX_GROUPS: usize = 32;
 
-/// Most bytes of all partial sums together, if the state is not smaller.
-const MAX_BYTES: u64 = 64 << 20;
+/// Most places of all partial sums together, if particles are not fewer.
+const MAX_PLACES: u64 = 4 << 20;
 
-/// Bytes of partial sums that are always allowed.
-const MIN_BYTES: u64 = 4 << 20;
+/// Places of partial sums that are always allowed.
+const MIN_PLACES: u64 = 256 << 10;
 
-/// How many consecutive blocks share one array of sums: a matter of the plan alone.
-pub fn blocks_per_group(n_particles: u64, state_bytes: u64, sums_len: usize) -> usize {
+/// How many consecutive blocks share one array of sums.
+///
+/// A matter of the number of particles and of the bins alone: with the columns or with the other
+/// outputs in it, a field that nobody reads would change the last bits of those that are read.
+pub fn blocks_per_group(n_particles: u64, n_places: usize) -> usize {
     let n_blocks = n_particles.div_ceil(BLOCK as u64).max(1) as usize;
-    let budget = state_bytes.clamp(MIN_BYTES, MAX_BYTES);
-    let n_groups = (budget / (8 * sums_len.max(1) as u64)).clamp(1, MAX_GROUPS as u64) as usize;
+    let budget = n_particles.clamp(MIN_PLACES, MAX_PLACES);
+    let n_groups = (budget / n_places.max(1) as u64).clamp(1, MAX_GROUPS as u64) as usize;
     n_blocks.div_ceil(n_groups.min(n_blocks))
 }
 
 /// Copies of a small histogram that neighbouring particles take in turn: without them each addition
 /// would wait for the one before when neighbours share a bin.
-pub fn lanes(sums_len: usize) -> usize {
-    if sums_len <= 1536 { 4 } else { 1 }
+pub fn lanes(n_slots: usize) -> usize {
+    if n_slots <= 768 { 4 } else { 1 }
 }
 
 /// Adds a chunk to `sums`: per slot and lane a count and the columns.

@@ -107,9 +107,7 @@ impl<'a, const D: usize> Run<'a, D> {
         let blocks = initial::blocks(&program)?;
         let before = amount::amounts(&blocks, program.n_columns());
         let limits = limits(&program, &before);
-        let sums_len = program.grid.n_slots() * (program.n_columns() + 1);
-        let bytes = state_bytes(plan.particles.count, D, program.n_columns());
-        let blocks_per_group = average::blocks_per_group(plan.particles.count, bytes, sums_len);
+        let blocks_per_group = average::blocks_per_group(plan.particles.count, program.grid.n_slots());
         let n_groups = blocks.len().div_ceil(blocks_per_group);
         let groups = (0..n_groups).map(|_| Group::default()).collect();
         Ok(Self {
@@ -164,7 +162,7 @@ impl<'a, const D: usize> Run<'a, D> {
     fn pass(&mut self, work: Work, step: u64, leap: Leap<D>) -> Result<(), RunError> {
         let stride = self.program.n_columns() + 1;
         let sums_len = if work.averages { self.program.grid.n_slots() * stride } else { 0 };
-        let n_lanes = average::lanes(sums_len);
+        let n_lanes = average::lanes(self.program.grid.n_slots());
         let pass = Pass {
             program: &self.program,
             work,

@@ -65,6 +65,11 @@ impl<'a, const D: usize> Mixing<'a, D> {
     }
 
     /// Two sums per pair of components: of `n cov_m` and of `cov_m`, over bins.
+    /// Bins, and the place outside.
+    pub fn n_slots(&self) -> usize {
+        self.means.counts.len()
+    }
+
     pub fn n_sums(&self) -> usize {
         2 * self.products.len()
     }

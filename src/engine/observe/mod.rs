@@ -17,7 +17,7 @@ use super::schedule::Due;
 use super::snapshot::{Snapshot, Values};
 use crate::plan::{Output, OutputKind, Quantity};
 use crate::state::grid::Grid;
-use crate::state::particles::{Block, CHUNK, state_bytes};
+use crate::state::particles::{Block, CHUNK};
 use chemistry::Needs;
 pub use lab::{Instant, Lab};
 use lab::{Load, Resolve};
@@ -85,7 +85,8 @@ fn means<'a, const D: usize>(run: &'a Run<D>, instant: &Instant<D>) -> Cow<'a, M
     }
 }
 
-/// Both passes over the particles, and what comes of them.
+/// Sums for all outputs due. Outputs that group blocks alike share their passes over the particles;
+/// how an output groups them does not hang on the others.
 fn sum<const D: usize>(
     run: &Run<D>,
     instant: &Instant<D>,
@@ -93,12 +94,37 @@ fn sum<const D: usize>(
     needs: &Needs,
     tallies: &[Tally<D>],
 ) -> Vec<Values> {
+    let n_particles = run.program.plan.particles.count;
+    let size = |tally: &Tally<D>| blocks_per_group(n_particles, tally.n_places());
+    let mut sizes: Vec<usize> = tallies.iter().map(size).collect();
+    sizes.sort_unstable();
+    sizes.dedup();
+    let mut values: Vec<(usize, Values)> = Vec::new();
+    for blocks_per_group in sizes {
+        let alike = tallies.iter().enumerate().filter(|(_, tally)| size(tally) == blocks_per_group);
+        let (places, alike): (Vec<usize>, Vec<&Tally<D>>) = alike.unzip();
+        let found = sum_alike(run, instant, means, needs, &alike, blocks_per_group);
+        values.extend(places.into_iter().zip(found));
+    }
+    values.sort_by_key(|(place, _)| *place);
+    values.into_iter().map(|(_, values)| values).collect()
+}
+
+/// Both passes over the particles, and what comes of them.
+fn sum_alike<const D: usize>(
+    run: &Run<D>,
+    instant: &Instant<D>,
+    means: &Means,
+    needs: &Needs,
+    tallies: &[&Tally<D>],
+    blocks_per_group: usize,
+) -> Vec<Values> {
     let first_at = offsets(tallies, |tally| tally.n_first());
     let second_at = offsets(tallies, |tally| tally.n_second());
     let (n_first, n_second) = (first_at[tallies.len()], second_at[tallies.len()]);
     let mut first = Vec::new();
-    if tallies.iter().any(|tally| !matches!(tally, Tally::Particles)) {
-        first = sweep(run, instant, Some((means, needs)), n_first, &|lab, sums| {
+    if n_first > 0 {
+        first = sweep(run, instant, Some((means, needs)), n_first, blocks_per_group, &|lab, sums| {
             for (idx, tally) in tallies.iter().enumerate() {
                 tally.add_first(lab, &mut sums[first_at[idx]..first_at[idx + 1]]);
             }
@@ -106,7 +132,7 @@ fn sum<const D: usize>(
     }
     let mut second = Vec::new();
     if n_second > 0 {
-        second = sweep(run, instant, Some((means, needs)), n_second, &|lab, sums| {
+        second = sweep(run, instant, Some((means, needs)), n_second, blocks_per_group, &|lab, sums| {
             for (idx, tally) in tallies.iter().enumerate() {
                 let first = &first[first_at[idx]..first_at[idx + 1]];
                 tally.add_second(lab, first, &mut sums[second_at[idx]..second_at[idx + 1]]);
@@ -122,7 +148,7 @@ fn sum<const D: usize>(
 }
 
 /// Where the sums of each tally start, and where the last one ends.
-fn offsets<const D: usize>(tallies: &[Tally<D>], len: impl Fn(&Tally<D>) -> usize) -> Vec<usize> {
+fn offsets<const D: usize>(tallies: &[&Tally<D>], len: impl Fn(&Tally<D>) -> usize) -> Vec<usize> {
     let mut offsets = vec![0];
     for tally in tallies {
         offsets.push(offsets[offsets.len() - 1] + len(tally));
@@ -133,7 +159,9 @@ fn offsets<const D: usize>(tallies: &[Tally<D>], len: impl Fn(&Tally<D>) -> usiz
 /// Bin means of the carried columns at the instant.
 fn average<const D: usize>(run: &Run<D>, instant: &Instant<D>, grid: &Grid<D>) -> Means {
     let stride = run.program.n_columns() + 1;
-    let sums = sweep(run, instant, None, grid.n_slots() * stride, &|lab, sums| {
+    let n_sums = grid.n_slots() * stride;
+    let blocks_per_group = blocks_per_group(run.program.plan.particles.count, grid.n_slots());
+    let sums = sweep(run, instant, None, n_sums, blocks_per_group, &|lab, sums| {
         let mut slots = [0; CHUNK];
         grid.locate(lab.positions(), &mut slots[..lab.n]);
         super::average::accumulate(&slots[..lab.n], &lab.columns, 0..lab.n, 1, sums);
@@ -150,11 +178,9 @@ fn sweep<const D: usize>(
     instant: &Instant<D>,
     resolved: Option<(&Means, &Needs)>,
     n_sums: usize,
+    blocks_per_group: usize,
     add: &(dyn Fn(&Lab<D>, &mut [f64]) + Sync),
 ) -> Vec<f64> {
-    let n_particles = run.program.plan.particles.count;
-    let bytes = state_bytes(n_particles, D, run.program.n_columns());
-    let blocks_per_group = blocks_per_group(n_particles, bytes, n_sums);
     let groups: Vec<_> = run.blocks.chunks(blocks_per_group).collect();
     let partial = parallel::map(groups.len(), &|group_idx| {
         let mut sums = vec![0.0; n_sums];

@@ -49,6 +49,15 @@ impl<'a, const D: usize> Tally<'a, D> {
         })
     }
 
+    /// Bins over which it sums: what decides how blocks are grouped.
+    pub fn n_places(&self) -> usize {
+        match self {
+            Self::Binned { grid, .. } | Self::Covariance { grid, .. } => grid.n_slots(),
+            Self::Mixing(mixing) => mixing.n_slots(),
+            Self::Total { .. } | Self::Particles => 1,
+        }
+    }
+
     /// Numbers that the first pass sums: for bins a count, then one number per column.
     pub fn n_first(&self) -> usize {
         match self {
