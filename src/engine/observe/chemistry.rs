@@ -102,12 +102,17 @@ fn react(
 ) {
     let mut extents = [f64::INFINITY; PART];
     for &(reactant, coefficient) in &reaction.reactants {
-        let values = unreacted[reactant][range.clone()].iter();
+        let values = &unreacted[reactant][range.clone()];
         // A division is dear and by 1 it changes nothing.
         if coefficient == 1.0 {
-            lower(&mut extents, values.copied());
+            for (extent, &own) in extents.iter_mut().zip(values) {
+                *extent = if own < *extent { own } else { *extent };
+            }
         } else {
-            lower(&mut extents, values.map(|value| value / coefficient));
+            for (extent, value) in extents.iter_mut().zip(values) {
+                let own = value / coefficient;
+                *extent = if own < *extent { own } else { *extent };
+            }
         }
     }
     let consumed = reaction.reactants.iter().map(|&(species, coefficient)| (species, -coefficient));
@@ -117,12 +122,5 @@ fn react(
                 *target += coefficient * extent;
             }
         }
-    }
-}
-
-#[inline(always)]
-fn lower(extents: &mut [f64; PART], values: impl Iterator<Item = f64>) {
-    for (extent, value) in extents.iter_mut().zip(values) {
-        *extent = if value < *extent { value } else { *extent };
     }
 }

@@ -95,6 +95,7 @@ impl<'a, const D: usize> Mixing<'a, D> {
     }
 
     /// Products of two deviations, times both weights of their bin.
+    #[inline(always)]
     fn products_of(
         &self,
         k: usize,

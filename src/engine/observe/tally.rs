@@ -228,13 +228,21 @@ fn covariances(n_bins: usize, n_pairs: usize, first: &[f64], second: &[f64]) -> 
 }
 
 /// A sum in fixed lanes, so that it vectorises and its error stays small.
+#[inline(always)]
 pub fn lane_sum(values: &[f64]) -> f64 {
     let (head, tail) = values.as_chunks::<LANES>();
     let mut lanes = [0.0; LANES];
     for values in head {
-        for (lane, value) in lanes.iter_mut().zip(values) {
-            *lane += value;
+        for lane in 0..LANES {
+            lanes[lane] += values[lane];
         }
     }
-    lanes.iter().sum::<f64>() + tail.iter().sum::<f64>()
+    let mut sum = 0.0;
+    for value in lanes {
+        sum += value;
+    }
+    for value in tail {
+        sum += value;
+    }
+    sum
 }
