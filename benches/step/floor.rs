@@ -3,12 +3,17 @@
 //! Words from `rand_chacha` by `fill_bytes`, Box–Muller in 32-bit lanes, move, reflect, bin, relax
 //! towards the bin's mean, sum. No checks, no choices, nothing general.
 
+#![allow(clippy::needless_range_loop)]
+
 use lamella::maths::{normal, wide::Width};
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 
 const CHUNK: usize = 1024;
 const BLOCK: usize = 65_536;
+
+/// Copies of the sums, so that neighbours in one bin do not wait for each other.
+const LANES: usize = 4;
 
 pub struct Floor {
     x: Vec<f64>,
@@ -21,7 +26,8 @@ pub struct Floor {
 struct Chunk<'a> {
     x: &'a mut [f64],
     w: &'a mut [f64],
-    words: &'a [u32; CHUNK],
+    bytes: &'a [[u8; 4]],
+    words: &'a mut [u32; CHUNK],
     normals: &'a mut [f64; CHUNK],
     means: &'a [f64],
     sums: &'a mut [[f64; 2]],
@@ -32,17 +38,21 @@ impl pulp::NullaryFnOnce for Chunk<'_> {
 
     #[inline(always)]
     fn call(self) {
-        let Self { x, w, words, normals, means, sums } = self;
+        let Self { x, w, bytes, words, normals, means, sums } = self;
+        for idx in 0..bytes.len() {
+            words[idx] = u32::from_le_bytes(bytes[idx]);
+        }
         normal::single(words, normals);
         let scale = means.len() as f64;
-        for ((x, w), noise) in x.iter_mut().zip(w.iter_mut()).zip(normals.iter()) {
-            let mean = means[((*x * scale) as i32 as usize).min(means.len() - 1)];
-            *w = mean + (*w - mean) * 0.999;
-            let moved = (*x + 3e-4 * noise).abs();
-            *x = if moved > 1.0 { 2.0 - moved } else { moved };
-            let sum = &mut sums[((*x * scale) as i32 as usize).min(means.len() - 1)];
+        for idx in 0..x.len() {
+            let mean = means[((x[idx] * scale) as i32 as usize).min(means.len() - 1)];
+            w[idx] = mean + (w[idx] - mean) * 0.999;
+            let moved = (x[idx] + 3e-4 * normals[idx]).abs();
+            x[idx] = if moved > 1.0 { 2.0 - moved } else { moved };
+            let bin = ((x[idx] * scale) as i32 as usize).min(means.len() - 1);
+            let sum = &mut sums[bin * LANES + idx % LANES];
             sum[0] += 1.0;
-            sum[1] += *w;
+            sum[1] += w[idx];
         }
     }
 }
@@ -51,7 +61,7 @@ impl Floor {
     pub fn new(n_particles: usize, n_bins: usize) -> Self {
         let x: Vec<f64> = (0..n_particles).map(|p| (p as f64 + 0.5) / n_particles as f64).collect();
         let w = x.iter().map(|&x| f64::from(u8::from(x < 0.5))).collect();
-        Self { x, w, means: vec![0.5; n_bins], sums: vec![[0.0; 2]; n_bins], n_steps: 0 }
+        Self { x, w, means: vec![0.5; n_bins], sums: vec![[0.0; 2]; n_bins * LANES], n_steps: 0 }
     }
 
     pub fn step(&mut self, width: Width) {
@@ -64,15 +74,21 @@ impl Floor {
             random.set_word_pos(u128::from(self.n_steps) * BLOCK as u128);
             for (x, w) in x.chunks_mut(CHUNK).zip(w.chunks_mut(CHUNK)) {
                 random.fill_bytes(&mut bytes);
-                for (word, bytes) in words.iter_mut().zip(bytes.as_chunks::<4>().0) {
-                    *word = u32::from_le_bytes(*bytes);
-                }
-                let (words, normals) = (&words, &mut normals);
-                width.run(Chunk { x, w, words, normals, means: &self.means, sums: &mut self.sums });
+                let (words, normals) = (&mut words, &mut normals);
+                width.run(Chunk {
+                    x,
+                    w,
+                    bytes: bytes.as_chunks().0,
+                    words,
+                    normals,
+                    means: &self.means,
+                    sums: &mut self.sums,
+                });
             }
         }
-        for (mean, sum) in self.means.iter_mut().zip(&self.sums) {
-            *mean = sum[1] / sum[0].max(1.0);
+        for (mean, lanes) in self.means.iter_mut().zip(self.sums.chunks(LANES)) {
+            let [count, sum] = lanes.iter().fold([0.0; 2], |all, lane| [all[0] + lane[0], all[1] + lane[1]]);
+            *mean = sum / f64::max(count, 1.0);
         }
         self.n_steps += 1;
     }
