@@ -35,8 +35,9 @@ bench: cargo ## Measure the hot loops (takes minutes; close other programs first
 bless: cargo ## Accept the present output of all snapshot tests; look at the difference before you commit
 	INSTA_UPDATE=always LAMELLA_BLESS=1 $(CARGO) test --release
 
-soak: cargo ## Feed millions of damaged scenes to the checker (takes many minutes)
-	LAMELLA_SOAK=1 $(CARGO) test --release --test soak -- --nocapture
+soak: cargo ## Run the experiments in full and feed a million damaged scenes to the checker (takes many minutes)
+	LAMELLA_SOAK=1 $(CARGO) test --release --test experiments -- --nocapture --test-threads 1
+	$(CARGO) run --release --example fuzz_check -- 1000000
 
 clean: ## Remove what was built; results stay
 	rm -rf target

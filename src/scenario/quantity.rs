@@ -96,7 +96,8 @@ impl Checker<'_> {
         };
         let word = number.unit.as_ref().map(|unit| unit.value.as_str()).unwrap_or_default();
         if self.scope.get(word).is_some() || self.axes.iter().any(|(axis, _)| axis == word) || word == "t" {
-            message = message.help(format!("to multiply write `{} * {word}`", number.digits));
+            // The name is what was meant: no unit comes near it.
+            message.help = vec![format!("to multiply write `{} * {word}`", number.digits)];
         }
         self.report(message);
     }

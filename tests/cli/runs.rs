@@ -178,3 +178,25 @@ fn an_interrupted_run_leaves_no_half_file_and_exits_130() {
         assert!(left.is_empty(), "{left:?}");
     }
 }
+
+#[test]
+fn a_measure_without_its_time_writes_nothing() {
+    let folder = Folder::new();
+    folder.write("small.lam", format!("{SMALL}measure late = integral(profile.AB) at t = 75 s\n"));
+    run(&folder, &[]).exits(1).says("error[R105]");
+    assert!(!folder.files().iter().any(|name| name.ends_with(".parquet")), "{:?}", folder.files());
+}
+
+#[test]
+fn layout_of_the_scene_changes_no_byte_of_the_data() {
+    let folder = Folder::new();
+    folder.write("small.lam", SMALL.replace("  ", " ").replace("initial B = c0 - A", "initial   B = c0-A"));
+    run(&folder, &["--out", "one"]).exits(0);
+    folder.lamella(&["fmt", "small.lam"]).exits(0);
+    run(&folder, &["--out", "two"]).exits(0);
+    for name in data_files(&folder, "one").iter().filter(|name| name.ends_with(".parquet")) {
+        let bytes =
+            |out: &str| std::fs::read(folder.path(&format!("{out}/{name}"))).expect("the file is there");
+        assert!(bytes("one") == bytes("two"), "{name} differs after fmt");
+    }
+}
