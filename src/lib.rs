@@ -46,5 +46,7 @@ pub fn check(mut sources: Sources, settings: &Settings, options: &Options) -> Ch
         diagnostics.extend(more);
         compiled
     });
+    // What stops a scene comes before what it may be run with.
+    diagnostics.sort_by_key(|diagnostic| !diagnostic.is_fatal());
     Checked { sources, file, scenario, compiled, diagnostics }
 }

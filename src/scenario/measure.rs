@@ -213,7 +213,10 @@ fn path_part<'a>(
         if let Some(&(_, index)) = checker.axes.iter().find(|(axis, _)| *axis == name.value) {
             return Some(Part::Field(Field::Position(index), Type::Number(Dimension::LENGTH), None));
         }
-        if let Some(Origin::Reference(idx)) = checker.scope.get(&name.value).map(|entry| entry.origin) {
+        if let Some(entry) = checker.scope.get_mut(&name.value)
+            && let Origin::Reference(idx) = entry.origin
+        {
+            entry.n_uses += 1;
             return reference_part(checker, results, idx);
         }
         return constant(checker, expr);

@@ -5,7 +5,7 @@ use crate::diagnostic::codes::{D002, D003, D004};
 use crate::diagnostic::{Diagnostic, did_you_mean};
 use crate::source::Span;
 use crate::syntax::tree;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Where a name comes from.
 #[derive(Debug, Clone, Copy)]
@@ -55,8 +55,8 @@ pub(super) struct Entry<'a> {
 #[derive(Debug, Default)]
 pub(super) struct Scope<'a> {
     entries: BTreeMap<String, Entry<'a>>,
-    /// Undefined names and where they were met first; reported once each.
-    undefined: BTreeMap<String, (Span, usize)>,
+    /// Undefined names and the places that use them; reported once each.
+    undefined: BTreeMap<String, BTreeSet<Span>>,
 }
 
 /// Names that the language itself gives a meaning.
@@ -118,36 +118,68 @@ impl<'a> Scope<'a> {
 
     /// Notes a use of a name that does not exist; [`Scope::report_undefined`] tells it.
     pub(super) fn note_undefined(&mut self, name: &str, span: Span) {
-        self.undefined.entry(name.to_owned()).or_insert((span, 0)).1 += 1;
+        self.undefined.entry(name.to_owned()).or_default().insert(span);
     }
 
-    /// One message per undefined name, at its first use.
+    /// One message per undefined name, at its first use or at the definition that is misspelt.
     pub(super) fn report_undefined(&self, axes: &[String], diagnostics: &mut Vec<Diagnostic>) {
-        for (name, (span, n_uses)) in &self.undefined {
-            let mut message = Diagnostic::error(D004, format!("`{name}` is not defined"))
-                .at(*span, "no such name")
-                .found(format!("`{name}`"))
-                .expected("a name that the scene defines");
-            match n_uses - 1 {
-                0 => {}
-                1 => message = message.note("it is used in one more place"),
-                n => message = message.note(format!("it is used in {n} more places")),
-            }
-            let names = self.entries.keys().map(String::as_str);
-            let candidates =
-                names.chain(BUILT_IN_FUNCTIONS.iter().copied()).chain(axes.iter().map(String::as_str));
-            if let Some(candidate) = did_you_mean(name, candidates) {
-                message = message.help(format!("did you mean `{candidate}`?"));
-                if let Some(entry) = self.entries.get(candidate) {
-                    message = message.also(entry.span, format!("`{candidate}` is defined here"));
-                }
-            }
-            if ["x", "y", "z"].contains(&name.as_str()) {
-                message = message.note(format!("the domain has no axis `{name}`"));
-            }
-            diagnostics.push(message);
+        for (name, uses) in &self.undefined {
+            let Some(first) = uses.first() else { continue };
+            let message = match self.misspelt_definition(name, uses) {
+                Some((written, entry)) => misspelt_definition(name, *first, written, entry),
+                None => self.undefined_use(name, *first, axes),
+            };
+            diagnostics.push(match uses.len() - 1 {
+                0 => message,
+                1 => message.note(format!("`{name}` is used in one more place")),
+                n => message.note(format!("`{name}` is used in {n} more places")),
+            });
         }
     }
+
+    /// The definition to blame for an undefined name: one that nothing uses and that differs by a slip,
+    /// while the name is written the same in several places.
+    fn misspelt_definition(&self, name: &str, uses: &BTreeSet<Span>) -> Option<(&str, &Entry<'a>)> {
+        if uses.len() < 2 {
+            return None;
+        }
+        let is_slip = |written: &str| {
+            let allowed = (name.chars().count().max(written.chars().count()) / 3).max(1);
+            strsim::damerau_levenshtein(name, written) <= allowed
+        };
+        let mut unused = self.entries.iter().filter(|(written, entry)| entry.n_uses == 0 && is_slip(written));
+        let (written, entry) = unused.next()?;
+        unused.next().is_none().then_some((written, entry))
+    }
+
+    fn undefined_use(&self, name: &str, span: Span, axes: &[String]) -> Diagnostic {
+        let mut message = Diagnostic::error(D004, format!("`{name}` is not defined"))
+            .at(span, "no such name")
+            .found(format!("`{name}`"))
+            .expected("a name that the scene defines");
+        let names = self.entries.keys().map(String::as_str);
+        let candidates =
+            names.chain(BUILT_IN_FUNCTIONS.iter().copied()).chain(axes.iter().map(String::as_str));
+        if let Some(candidate) = did_you_mean(name, candidates) {
+            message = message.help(format!("did you mean `{candidate}`?"));
+            if let Some(entry) = self.entries.get(candidate) {
+                message = message.also(entry.span, format!("`{candidate}` is defined here"));
+            }
+        }
+        if ["x", "y", "z"].contains(&name) {
+            message = message.note(format!("the domain has no axis `{name}`"));
+        }
+        message
+    }
+}
+
+fn misspelt_definition(name: &str, first_use: Span, written: &str, entry: &Entry<'_>) -> Diagnostic {
+    Diagnostic::error(D004, format!("`{name}` is not defined, and nothing uses `{written}`"))
+        .at(entry.span, format!("{} that nothing uses: did you mean `{name}`?", entry.origin.describe()))
+        .also(first_use, "no such name")
+        .found(format!("`{written}`"))
+        .expected(format!("`{name}`"))
+        .help(format!("call it `{name}` here, or use `{written}` there"))
 }
 
 /// What a name means before any scene speaks.

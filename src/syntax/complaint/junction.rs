@@ -96,6 +96,12 @@ impl Stop<'_> {
         };
         let diagnostic =
             Diagnostic::error(codes::S001, message).at(span, label).found(self.found()).expected(expected);
+        let diagnostic = match self.open_brackets().last() {
+            Some(&opener) if self.word(opener) == "(" => {
+                diagnostic.also(self.span(opener), "this bracket is still open")
+            }
+            _ => diagnostic,
+        };
         match self.help() {
             Some(help) => diagnostic.help(help),
             None => diagnostic,

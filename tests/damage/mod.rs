@@ -1,0 +1,62 @@
+//! Scenes that someone has damaged: what `check` is fed with to see that it stays calm and points at
+//! the damage. Shared by the tests and by the example `fuzz_check`.
+#![allow(dead_code)]
+
+pub mod mutants;
+pub mod noise;
+
+use lamella::diagnostic::Diagnostic;
+use lamella::plan::compile::Options;
+use lamella::scenario::Settings;
+use lamella::source::{FileId, Sources};
+use lamella::syntax::parse;
+use lamella::syntax::tree::TokenKind;
+use std::ops::Range;
+
+/// Kind and place of a token.
+pub type Token = (TokenKind, Range<usize>);
+
+/// Name and text of every scene that is shipped, sorted by name.
+pub fn shipped_scenes() -> Vec<(String, String)> {
+    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut folders = vec![root.join("tests/scenes")];
+    let experiments =
+        std::fs::read_dir(root.join("experiments")).expect("the folder is part of the repository");
+    folders
+        .extend(experiments.map(|entry| entry.expect("a folder entry").path()).filter(|path| path.is_dir()));
+    let mut scenes = Vec::new();
+    for folder in folders {
+        for entry in std::fs::read_dir(folder).expect("a folder of scenes") {
+            let path = entry.expect("a folder entry").path();
+            if path.extension().is_some_and(|extension| extension == "lam") {
+                let name = path.strip_prefix(root).expect("below the root").display().to_string();
+                scenes.push((name, std::fs::read_to_string(&path).expect("a scene is text")));
+            }
+        }
+    }
+    scenes.sort();
+    scenes
+}
+
+/// Everything that `check` says about a text, in its order.
+pub fn messages(text: &str) -> Vec<Diagnostic> {
+    lamella::check(Sources::single("scene.lam", text), &Settings::default(), &Options::default()).diagnostics
+}
+
+/// The tokens that carry meaning.
+pub fn tokens(text: &str) -> Vec<Token> {
+    let (file, _) = parse(FileId(0), text);
+    let is_kept = |kind| !matches!(kind, TokenKind::Blank | TokenKind::Newline | TokenKind::Comment);
+    file.tokens
+        .iter()
+        .filter(|token| is_kept(token.kind))
+        .map(|token| (token.kind, token.span.range()))
+        .collect()
+}
+
+/// The text with a range replaced, and where the replacement lies.
+pub fn replaced(text: &str, range: &Range<usize>, by: &str) -> (String, Range<usize>) {
+    let mut result = text.to_owned();
+    result.replace_range(range.clone(), by);
+    (result, range.start..range.start + by.len())
+}
