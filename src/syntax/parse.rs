@@ -14,9 +14,13 @@ use super::words::{LATER_KEYWORDS, RESERVED_WORDS, STATEMENT_KEYWORDS, is_statem
 use crate::diagnostic::{Diagnostic, codes, did_you_mean};
 use crate::source::{FileId, Span};
 use pest::Parser;
+use rayon::prelude::*;
 
 /// The edition that this version reads.
 pub const EDITION: u32 = 1;
+
+/// Fewer are parsed sooner than a thread wakes up.
+const MIN_STATEMENTS_PER_THREAD: usize = 64;
 
 /// Parses one file. Statements that do not parse have a message and are left out of the tree; any
 /// text, however broken, gives a tree and never a panic.
@@ -30,8 +34,14 @@ pub fn parse(file: FileId, text: &str) -> (File, Vec<Diagnostic>) {
     let mut diagnostics: Vec<Diagnostic> = check_edition_line(file, lexed, &chunks).into_iter().collect();
     let mut statements = Vec::new();
     let mut lost_body = LostBody::default();
-    for chunk in &chunks {
-        match parse_statement(file, lexed, chunk) {
+    // Statements do not depend on each other, and long scenes should be checked while one types.
+    let parsed: Vec<_> = chunks
+        .par_iter()
+        .with_min_len(MIN_STATEMENTS_PER_THREAD)
+        .map(|chunk| parse_statement(file, lexed, chunk))
+        .collect();
+    for (chunk, result) in chunks.iter().zip(parsed) {
+        match result {
             Ok(statement) => statements.push(statement),
             Err(found) if !lost_body.covers(lexed, chunk) => diagnostics.extend(found),
             Err(_) => {}

@@ -102,7 +102,9 @@ fn express(form: &Affine, kept: &[usize], forms: &[Affine]) -> Option<Relation> 
     if form.terms.is_empty() {
         return form.constant.is_finite().then_some(Relation { constant: form.constant, terms: Vec::new() });
     }
-    if kept.is_empty() {
+    // A shape that no kept component has cannot be made of them: the usual case, and cheap to see.
+    let is_known = |name: &String| kept.iter().any(|idx| forms[*idx].terms.contains_key(name));
+    if !form.terms.keys().all(is_known) {
         return None;
     }
     let mut names: Vec<&String> = form.terms.keys().collect();
