@@ -227,7 +227,10 @@ impl Noise {
                 0 => text.replace_range(range, ""),
                 1 => text.replace_range(range, random.word(&self.pieces)),
                 2 => text.insert_str(range.start, random.word(&self.pieces)),
-                3 => text.insert_str(range.end, &text[range.clone()].to_owned()),
+                3 => {
+                    let again = text[range.clone()].to_owned();
+                    text.insert_str(range.end, &again);
+                }
                 _ => {
                     let start = floor_boundary(&text, random.below(text.len()));
                     let end = floor_boundary(&text, (start + random.below(30)).min(text.len()));
