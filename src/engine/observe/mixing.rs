@@ -64,12 +64,12 @@ impl<'a, const D: usize> Mixing<'a, D> {
         Self { grid, means, weights, products, recipes, volume, carried_fraction: program.carried_fraction }
     }
 
-    /// Two sums per pair of components: of `n cov_m` and of `cov_m`, over bins.
     /// Bins, and the place outside.
     pub fn n_slots(&self) -> usize {
         self.means.counts.len()
     }
 
+    /// Two sums per pair of components: of `n cov_m` and of `cov_m`, over bins.
     pub fn n_sums(&self) -> usize {
         2 * self.products.len()
     }
