@@ -12,6 +12,7 @@ use lamella::source::{FileId, Sources};
 use lamella::syntax::parse;
 use lamella::syntax::tree::TokenKind;
 use std::ops::Range;
+use std::time::{Duration, Instant};
 
 /// Kind and place of a token.
 pub type Token = (TokenKind, Range<usize>);
@@ -41,6 +42,20 @@ pub fn shipped_scenes() -> Vec<(String, String)> {
 /// Everything that `check` says about a text, in its order.
 pub fn messages(text: &str) -> Vec<Diagnostic> {
     lamella::check(Sources::single("scene.lam", text), &Settings::default(), &Options::default()).diagnostics
+}
+
+/// A guard against hanging, hundreds of times what a text of the noise needs.
+pub const LIMIT: Duration = Duration::from_secs(1);
+
+/// How long `check` takes; none if it panics. A text beyond the limit is timed once more: a machine
+/// that stands still for a while is no fault of the text.
+pub fn time_of_check(text: &str) -> Option<Duration> {
+    let time = || {
+        let start = Instant::now();
+        std::panic::catch_unwind(|| messages(text)).ok().map(|_| start.elapsed())
+    };
+    let first = time()?;
+    if first > LIMIT { Some(first.min(time()?)) } else { Some(first) }
 }
 
 /// The tokens that carry meaning.
