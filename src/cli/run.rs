@@ -127,8 +127,10 @@ impl Job {
         let row = self.point(&found);
         let written = writer.finish(vec![row], &errors).map_err(table_failed)?;
         let figure_path = self.folder.join("figure.svg");
-        if let Some(figure) = &figure {
-            write_whole(&figure_path, figure)?;
+        match &figure {
+            Some(figure) => write_whole(&figure_path, figure)?,
+            // A figure of an earlier run must not stand beside the tables of this one.
+            None => drop(std::fs::remove_file(&figure_path)),
         }
         let measures = record::measures(&found.evaluated);
         let summary = Summary {

@@ -59,6 +59,12 @@ impl fmt::Display for RunError {
             Self::NonFiniteConcentration { step, particle, component } => {
                 write!(f, "step {step}: `{component}` of particle {particle} is not a finite number")
             }
+            Self::NegativeConcentration { step: 0, particle, component, value } => {
+                write!(
+                    f,
+                    "the initial concentration of `{component}` is negative for particle {particle} ({value:e})"
+                )
+            }
             Self::NegativeConcentration { step, particle, component, value } => {
                 write!(f, "step {step}: `{component}` of particle {particle} became negative ({value:e})")
             }

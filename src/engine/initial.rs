@@ -51,5 +51,30 @@ fn fill<const D: usize>(program: &Program<D>, block: &mut Block<D>) -> Result<()
         }
         others.iter_mut().for_each(|other| other.copy_from_slice(first));
     }
+    check_signs(program, block)
+}
+
+/// Species restored from a relation are checked like carried ones: a negative start makes products
+/// from nothing. Values of rounding size, relative to what they are made of, pass.
+fn check_signs<const D: usize>(program: &Program<D>, block: &Block<D>) -> Result<(), RunError> {
+    let n_slots = program.roles.len();
+    for species in &program.plan.species {
+        for idx in 0..block.n_particles {
+            let (mut value, mut size) = (species.constant, species.constant.abs());
+            for &(component, coefficient) in &species.terms {
+                let term = coefficient * block.columns[component * n_slots][idx];
+                value += term;
+                size += term.abs();
+            }
+            if value < -1e-12 * size {
+                return Err(RunError::NegativeConcentration {
+                    step: 0,
+                    particle: block.idx * BLOCK as u64 + idx as u64,
+                    component: species.name.clone(),
+                    value,
+                });
+            }
+        }
+    }
     Ok(())
 }

@@ -73,10 +73,10 @@ fn observed(snapshot: &Snapshot, column: usize, n_bins: usize) -> Result<Observe
             covariance.get(column).map(|values| (values.clone(), None, filled(n_particles)))
         }
         Values::Total { amount } => single(amount.get(column).copied()),
-        // γ has no value where nothing is mixed yet (M_mean = 0): left out like an empty bin.
-        Values::Mixing(states) => states
-            .get(column)
-            .map(|state| (vec![state.gamma], None, vec![!(state.gamma.is_nan() && state.m_mean == 0.0)])),
+        // γ has no value where nothing is mixed yet (M_mean = 0 but for rounding): left out like an empty bin.
+        Values::Mixing(states) => states.get(column).map(|state| {
+            (vec![state.gamma], None, vec![!(state.gamma.is_nan() && state.m_mean.is_finite())])
+        }),
         Values::Particles { .. } => None,
     };
     match found {

@@ -200,3 +200,38 @@ fn layout_of_the_scene_changes_no_byte_of_the_data() {
         assert!(bytes("one") == bytes("two"), "{name} differs after fmt");
     }
 }
+
+#[test]
+fn a_negative_start_stops_the_run_by_name() {
+    let folder = Folder::new();
+    // B is not carried but restored from A: its sign is checked all the same.
+    folder.write("small.lam", SMALL.replace("then c0 else 0", "then 2 * c0 else 0"));
+    run(&folder, &[]).exits(1).says("error[R102]").says("initial concentration of `B` is negative");
+    assert!(!folder.files().iter().any(|name| name.ends_with(".parquet")), "{:?}", folder.files());
+}
+
+#[test]
+fn gamma_has_no_value_before_anything_mixes() {
+    let folder = Folder::new();
+    let odd = SMALL.replace("0.02 mol/L", "0.0137 mol/L");
+    folder.write(
+        "small.lam",
+        format!("{odd}reference theory for mixing A, B = front_gamma(eta = 0.5, chi = 1e-3 /s)\n"),
+    );
+    let finished = run(&folder, &["--message-format", "json"]).exits(0);
+    assert!(finished.stdout.contains("theory"), "{}", finished.stdout);
+    let evaluated: serde_json::Value = serde_json::from_str(&finished.stdout).expect("one object");
+    let row = evaluated["errors"].as_array().expect("rows").iter().find(|row| row["reference"] == "theory");
+    let largest = row.and_then(|row| row["linf"].as_f64()).expect("the reference has an error");
+    // Against −0.25 at t = 0 a value made of rounding would be an error of about one.
+    assert!(largest < 0.2, "rounding at t = 0 is no γ: {row:?}");
+}
+
+#[test]
+fn an_old_figure_does_not_stay_beside_new_tables() {
+    let folder = with_small();
+    run(&folder, &["--plot"]).exits(0);
+    assert!(folder.files().contains(&"results/small/figure.svg".to_owned()));
+    run(&folder, &["--seed", "7"]).exits(0);
+    assert!(!folder.files().contains(&"results/small/figure.svg".to_owned()));
+}

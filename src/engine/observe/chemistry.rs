@@ -115,6 +115,8 @@ fn react(
             }
         }
     }
+    // A total that is negative by rounding makes no product.
+    extents.iter_mut().for_each(|extent| *extent = if *extent < 0.0 { 0.0 } else { *extent });
     let consumed = reaction.reactants.iter().map(|&(species, coefficient)| (species, -coefficient));
     for (idx, coefficient) in consumed.chain(reaction.products.iter().copied()) {
         if needs.reacted[idx] {

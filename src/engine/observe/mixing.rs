@@ -35,6 +35,9 @@ pub struct Mixing<'a, const D: usize> {
     carried_fraction: f64,
 }
 
+/// Size of an M_mean that is rounding alone, relative to that of uniform fluids of the same amounts.
+const ROUNDING: f64 = 1e-13;
+
 /// A pair of species as constants and coefficients of components.
 struct Recipe {
     a: (f64, Vec<(usize, f64)>),
@@ -124,7 +127,7 @@ impl<'a, const D: usize> Mixing<'a, D> {
     ///   `M = M_mean + M_cov`, `γ = M_cov / M_mean`; `V_b = n_b v`.
     /// - Symbols: `c̄` means of unreacted concentrations in bin `b`, `n_b` particles, `v` the volume of
     ///   one, `cov_m` and `f` as above.
-    /// - Range: `γ` is not a number where `M_mean` is 0; particles outside open sides do not count.
+    /// - Range: `γ` is not a number where `M_mean` is 0 but for rounding; particles outside open sides do not count.
     /// - Source: Sole-Mari et al. (2020), M and γ; methods, section 7.5. The subtraction of `cov_m/n_b`
     ///   is the sampling bias of a product of two means.
     /// - Shape: one state per pair.
@@ -149,13 +152,19 @@ impl<'a, const D: usize> Mixing<'a, D> {
                 bias += coefficient_a * coefficient_b * sums[idx][1];
             }
         }
+        // Below this M_mean is the rounding of values that cancel: fluids that nothing has mixed yet.
+        let amount = |side: &(f64, Vec<(usize, f64)>)| {
+            (0..n_bins).map(|bin| self.means.counts[bin] * mean(side, bin).abs()).sum::<f64>()
+        };
+        let n_inside = lane_sum(&self.means.counts[..n_bins]);
+        let rounding = ROUNDING * self.volume * amount(&recipe.a) * amount(&recipe.b) / n_inside;
         let m_cov = self.volume * self.carried_fraction * self.carried_fraction * covariance;
         let m_mean = self.volume * (lane_sum(&products) - bias);
         MixingState {
             m: m_mean + m_cov,
             m_mean,
             m_cov,
-            gamma: if m_mean == 0.0 { f64::NAN } else { m_cov / m_mean },
+            gamma: if m_mean.abs() <= rounding { f64::NAN } else { m_cov / m_mean },
         }
     }
 }
