@@ -30,7 +30,7 @@ check: cargo ## Look at format, lints and documentation
 	RUSTDOCFLAGS="-D warnings" $(CARGO) doc --release --no-deps --document-private-items
 
 bench: cargo ## Measure the hot loops (takes minutes; close other programs first)
-	$(CARGO) bench
+	$(CARGO) bench --bench step
 
 bless: cargo ## Accept the present output of all snapshot tests; look at the difference before you commit
 	INSTA_UPDATE=always LAMELLA_BLESS=1 $(CARGO) test --release

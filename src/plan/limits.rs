@@ -129,14 +129,16 @@ fn particles_per_bin(
         advice: "at least 50; above 1000 the bias of products is below 0.1 %",
     });
     let needed = (n_bins(plan) * FEW_PER_BIN).ceil();
-    let affordable = (n_particles / FEW_PER_BIN).floor().max(1.0);
+    let affordable = (n_particles / FEW_PER_BIN).floor();
+    let fewer_bins =
+        if affordable >= 1.0 { format!(", or at most {affordable} bins in all") } else { String::new() };
     let place = |message: Diagnostic| {
         message
             .at(bins_span(scenario), format!("{} bins", n_bins(plan)))
             .also(scenario.particles.count_span, format!("{} particles", plan.particles.count))
             .found(format!("{} particles per bin", short(per_bin)))
             .expected(format!("at least {FEW_PER_BIN}"))
-            .help(format!("use at least {needed} particles, or at most {affordable} bins in all"))
+            .help(format!("use at least {needed} particles{fewer_bins}"))
     };
     if per_bin < TOO_FEW_PER_BIN {
         diagnostics

@@ -43,7 +43,8 @@ pub(super) fn mixing<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>)
     if !is_right {
         return None;
     }
-    let sum: f64 = zones.iter().map(|zone| zone.fraction).sum();
+    // The sum of nothing is −0, which no reader expects.
+    let sum = zones.iter().map(|zone| zone.fraction).sum::<f64>() + 0.0;
     if (sum - 1.0).abs() > 1e-9 {
         checker.report(
             Diagnostic::error(M013, "the fractions of the zones do not add up")

@@ -56,6 +56,7 @@ fn note(draft: &mut Draft, relations: &[Option<Relation>]) {
             .map(|(component, factor)| match *factor {
                 1.0 => format!(" + {}", name(*component)),
                 -1.0 => format!(" - {}", name(*component)),
+                factor if factor < 0.0 => format!(" - {} {}", -factor, name(*component)),
                 factor => format!(" + {factor} {}", name(*component)),
             })
             .collect();
