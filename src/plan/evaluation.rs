@@ -5,6 +5,7 @@
 
 use super::tape::{Binary, Tape, Unary};
 use super::{OutputKind, Quantity};
+pub use crate::scenario::{Fact, Norm};
 use serde::{Deserialize, Serialize};
 
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -56,40 +57,6 @@ pub enum Scalar {
     Norm(Norm, Box<Field>),
     Unary(Unary, Box<Scalar>),
     Binary(Binary, Box<Scalar>, Box<Scalar>),
-}
-
-/// What a run knows of itself.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Fact {
-    /// Wall seconds of the engine.
-    WallTime,
-    CpuTime,
-    /// Largest relative mass defect of any component.
-    MassDefect,
-    Particles,
-    Steps,
-}
-
-/// From a field (bins × times, or times) to a number. Sums over space are integrals with the bin
-/// widths; over times they are plain sums (norms) or means (integral, mean).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Norm {
-    /// Σ_t ∫ |f| dx
-    L1,
-    /// (Σ_t ∫ f² dx)^½
-    L2,
-    /// max |f|
-    LInf,
-    /// (mean of f² over bins and times)^½
-    Rmse,
-    /// mean over t of ∫ f dx
-    Integral,
-    /// mean over bins and times
-    Mean,
-    Minimum,
-    Maximum,
 }
 
 /// An expression whose value is a field over the bins and times of one output.

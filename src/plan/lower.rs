@@ -237,31 +237,12 @@ fn lower_scalar(scalar: &scenario::Scalar) -> evaluation::Scalar {
     use scenario::Scalar as From;
     match scalar {
         From::Number(value) => To::Number(*value),
-        From::Fact(fact) => To::Fact(match fact {
-            scenario::Fact::WallTime => evaluation::Fact::WallTime,
-            scenario::Fact::CpuTime => evaluation::Fact::CpuTime,
-            scenario::Fact::MassDefect => evaluation::Fact::MassDefect,
-            scenario::Fact::Particles => evaluation::Fact::Particles,
-            scenario::Fact::Steps => evaluation::Fact::Steps,
-        }),
-        From::Norm(norm, field) => To::Norm(lower_norm(*norm), Box::new(lower_field(field))),
+        From::Fact(fact) => To::Fact(*fact),
+        From::Norm(norm, field) => To::Norm(*norm, Box::new(lower_field(field))),
         From::Unary(operator, a) => To::Unary(*operator, Box::new(lower_scalar(a))),
         From::Binary(operator, a, b) => {
             To::Binary(*operator, Box::new(lower_scalar(a)), Box::new(lower_scalar(b)))
         }
-    }
-}
-
-fn lower_norm(norm: scenario::Norm) -> evaluation::Norm {
-    match norm {
-        scenario::Norm::L1 => evaluation::Norm::L1,
-        scenario::Norm::L2 => evaluation::Norm::L2,
-        scenario::Norm::LInf => evaluation::Norm::LInf,
-        scenario::Norm::Rmse => evaluation::Norm::Rmse,
-        scenario::Norm::Integral => evaluation::Norm::Integral,
-        scenario::Norm::Mean => evaluation::Norm::Mean,
-        scenario::Norm::Minimum => evaluation::Norm::Minimum,
-        scenario::Norm::Maximum => evaluation::Norm::Maximum,
     }
 }
 

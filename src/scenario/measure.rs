@@ -13,6 +13,7 @@ use crate::maths::operator::{Binary, Unary};
 use crate::source::Span;
 use crate::syntax::tree::{self, BinaryOperator, ExprKind, UnaryOperator};
 use crate::units::Dimension;
+use serde::{Deserialize, Serialize};
 
 /// An expression whose value is one number.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,23 +26,34 @@ pub enum Scalar {
 }
 
 /// What a run knows of itself.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Fact {
+    /// Wall seconds of the engine.
     WallTime,
     CpuTime,
+    /// Largest relative mass defect of any component.
     MassDefect,
     Particles,
     Steps,
 }
 
-/// From a field to a number; see `plan::evaluation::Norm`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// From a field (bins × times, or times) to a number. Sums over space are integrals with the bin
+/// widths; over times they are plain sums (norms) or means (integral, mean).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Norm {
+    /// Σ_t ∫ |f| dx
     L1,
+    /// (Σ_t ∫ f² dx)^½
     L2,
+    /// max |f|
     LInf,
+    /// (mean of f² over bins and times)^½
     Rmse,
+    /// mean over t of ∫ f dx
     Integral,
+    /// mean over bins and times
     Mean,
     Minimum,
     Maximum,
