@@ -97,6 +97,7 @@ codes! {
     M014 "a reference is compared with nothing",
     M015 "a measure asks for a result that no output gives",
     M016 "a reference does not fit",
+    M017 "a measure could mean more than one output",
     N101 "means over few particles are mostly noise",
     N102 "the step is coarse for a mixing zone",
     N103 "the bins add dispersion",

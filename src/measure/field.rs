@@ -6,6 +6,7 @@
 use super::grid::Grid;
 use super::observed::Run;
 use super::reference::Prepared;
+use crate::plan::Output;
 use crate::plan::evaluation::Field;
 
 /// Sums from which all norms follow.
@@ -97,44 +98,6 @@ pub(super) struct AtTime {
     pub(super) is_filled: Vec<bool>,
 }
 
-/// The output whose bins and times a field takes: that of its first output, else that of its
-/// first reference, preferably `hint`.
-pub(super) fn output_of(
-    run: &Run,
-    references: &[Prepared],
-    field: &Field,
-    hint: Option<usize>,
-) -> Result<Option<usize>, String> {
-    Ok(match field {
-        Field::Number(_) | Field::Position(_) => None,
-        Field::Output(kind, quantity) => {
-            Some(run.find(*kind, *quantity).ok_or("no output of the run has that species or pair.")?)
-        }
-        Field::Reference(idx) => {
-            let reference = references.get(*idx).ok_or("it uses a reference that does not exist.")?;
-            let applies = |&output_idx: &usize| reference.applies_to(run.output(output_idx));
-            let found = hint.filter(applies).or_else(|| (0..run.plan.outputs.len()).find(applies));
-            Some(found.ok_or("no output of the run is of the kind that its reference predicts.")?)
-        }
-        Field::Unary(_, a) => output_of(run, references, a, hint)?,
-        Field::Binary(_, a, b) => {
-            let hint = first_output(run, field).or(hint);
-            let (a, b) = (output_of(run, references, a, hint)?, output_of(run, references, b, hint)?);
-            a.or(b)
-        }
-    })
-}
-
-/// The first output that a field names.
-pub(super) fn first_output(run: &Run, field: &Field) -> Option<usize> {
-    match field {
-        Field::Number(_) | Field::Position(_) | Field::Reference(_) => None,
-        Field::Output(kind, quantity) => run.find(*kind, *quantity),
-        Field::Unary(_, a) => first_output(run, a),
-        Field::Binary(_, a, b) => first_output(run, a).or_else(|| first_output(run, b)),
-    }
-}
-
 /// The values of a field on the bins and times of an output.
 pub(super) fn values(
     run: &Run,
@@ -142,7 +105,7 @@ pub(super) fn values(
     field: &Field,
     output_idx: usize,
 ) -> Result<Values, String> {
-    let output = run.output(output_idx);
+    let output = run.plan.outputs.get(output_idx).ok_or("the run does not have its output.")?;
     let series = run.series(output_idx, output.quantities[0])?;
     let n_bins = series.grid.n_bins();
     let times = series
@@ -151,12 +114,18 @@ pub(super) fn values(
         .map(|observed| AtTime { t: observed.t, values: vec![0.0; n_bins], is_filled: vec![true; n_bins] })
         .collect();
     let mut empty = Values { grid: series.grid, times };
-    fill(run, references, field, &mut empty)?;
+    fill(run, references, field, output, &mut empty)?;
     Ok(empty)
 }
 
 /// Replaces the values of `target` by those of the field; bins without particles are marked.
-fn fill(run: &Run, references: &[Prepared], field: &Field, target: &mut Values) -> Result<(), String> {
+fn fill(
+    run: &Run,
+    references: &[Prepared],
+    field: &Field,
+    on: &Output,
+    target: &mut Values,
+) -> Result<(), String> {
     match field {
         Field::Number(number) => target.times.iter_mut().for_each(|time| time.values.fill(*number)),
         Field::Position(index) => {
@@ -164,13 +133,13 @@ fn fill(run: &Run, references: &[Prepared], field: &Field, target: &mut Values) 
             target.times.iter_mut().for_each(|time| time.values.copy_from_slice(&centres));
         }
         Field::Output(kind, quantity) => {
-            let output_idx =
-                run.find(*kind, *quantity).ok_or("no output of the run has that species or pair.")?;
+            let output_idx = run.find(*kind, *quantity, on);
+            let output_idx = output_idx.ok_or(
+                "no output of the run has that species or pair on the bins and times of the others.",
+            )?;
             let series = run.series(output_idx, *quantity)?;
-            let has_same_times = series.times.len() == target.times.len()
-                && series.times.iter().zip(&target.times).all(|(a, b)| a.t == b.t);
-            if series.grid != target.grid || !has_same_times {
-                return Err("it combines outputs whose bins or times differ.".into());
+            if series.times.len() != target.times.len() {
+                return Err("it combines outputs whose times differ.".into());
             }
             for (time, observed) in target.times.iter_mut().zip(series.times) {
                 time.values = observed.values;
@@ -179,18 +148,19 @@ fn fill(run: &Run, references: &[Prepared], field: &Field, target: &mut Values) 
         }
         Field::Reference(idx) => {
             for time in &mut target.times {
-                time.values = references[*idx].bin_means(time.t, &target.grid);
+                let reference = references.get(*idx).ok_or("it uses a reference that does not exist.")?;
+                time.values = reference.bin_means(time.t, &target.grid);
             }
         }
         Field::Unary(operator, a) => {
-            fill(run, references, a, target)?;
+            fill(run, references, a, on, target)?;
             let values = target.times.iter_mut().flat_map(|time| &mut time.values);
             values.for_each(|value| *value = operator.apply(*value));
         }
         Field::Binary(operator, a, b) => {
             let mut other = target.blank();
-            fill(run, references, a, target)?;
-            fill(run, references, b, &mut other)?;
+            fill(run, references, a, on, target)?;
+            fill(run, references, b, on, &mut other)?;
             target.combine(&other, |a, b| operator.apply(a, b));
         }
     }

@@ -35,9 +35,14 @@ impl Run<'_> {
         &self.plan.outputs[output_idx]
     }
 
-    /// The first output of that kind that has the quantity.
-    pub(super) fn find(&self, kind: OutputKind, quantity: Quantity) -> Option<usize> {
-        self.plan.outputs.iter().position(|output| output.kind == kind && column(output, quantity).is_some())
+    /// The output of that kind with the quantity that has the bins and times of another one.
+    pub(super) fn find(&self, kind: OutputKind, quantity: Quantity, like: &Output) -> Option<usize> {
+        self.plan.outputs.iter().position(|output| {
+            output.kind == kind
+                && column(output, quantity).is_some()
+                && output.bins == like.bins
+                && output.times == like.times
+        })
     }
 
     /// The values of a quantity at all times of an output.

@@ -3,37 +3,22 @@
 //! Owns facts, norms and their arithmetic. May use the other parts of `measure`. It deliberately
 //! rounds nothing.
 
-use super::field::{Norms, first_output, output_of, values};
+use super::field::{Norms, values};
 use super::grid::Grid;
 use super::observed::Run;
 use super::reference::Prepared;
 use crate::engine::snapshot::Outcome;
-use crate::plan::evaluation::{Fact, Field, Measure, Norm, Scalar};
-
-/// Times that are asked for by number match those of the run to this relative distance.
-const SAME_TIME: f64 = 1e-9;
+use crate::plan::evaluation::{Fact, Field, Measure, Norm, SAME_TIME, Scalar};
 
 /// The value of a measure; an error is the end of a sentence about it.
 pub(super) fn value(run: &Run, references: &[Prepared], measure: &Measure) -> Result<f64, String> {
-    let hint = output_in(run, &measure.value);
-    Evaluator { run, references, measure, hint }.scalar(&measure.value)
-}
-
-/// The first output that a measure names: references alone are taken on its bins, too.
-fn output_in(run: &Run, scalar: &Scalar) -> Option<usize> {
-    match scalar {
-        Scalar::Number(_) | Scalar::Fact(_) => None,
-        Scalar::Norm(_, field) => first_output(run, field),
-        Scalar::Unary(_, a) => output_in(run, a),
-        Scalar::Binary(_, a, b) => output_in(run, a).or_else(|| output_in(run, b)),
-    }
+    Evaluator { run, references, measure }.scalar(&measure.value)
 }
 
 struct Evaluator<'a> {
     run: &'a Run<'a>,
     references: &'a [Prepared<'a>],
     measure: &'a Measure,
-    hint: Option<usize>,
 }
 
 impl Evaluator<'_> {
@@ -41,15 +26,13 @@ impl Evaluator<'_> {
         Ok(match scalar {
             Scalar::Number(number) => *number,
             Scalar::Fact(fact) => value_of(*fact, self.run.outcome),
-            Scalar::Norm(norm, field) => self.norm(*norm, field)?,
+            Scalar::Norm(norm, output_idx, field) => self.norm(*norm, *output_idx, field)?,
             Scalar::Unary(operator, a) => operator.apply(self.scalar(a)?),
             Scalar::Binary(operator, a, b) => operator.apply(self.scalar(a)?, self.scalar(b)?),
         })
     }
 
-    fn norm(&self, norm: Norm, field: &Field) -> Result<f64, String> {
-        let output_idx = output_of(self.run, self.references, field, self.hint)?
-            .ok_or("it takes a norm of a plain number.")?;
+    fn norm(&self, norm: Norm, output_idx: usize, field: &Field) -> Result<f64, String> {
         let field = values(self.run, self.references, field, output_idx)?;
         let is_within = self.bins_within(&field.grid)?;
         let wanted = self.times_within(&field.times.iter().map(|time| time.t).collect::<Vec<_>>())?;

@@ -143,12 +143,12 @@ fn a_constant_offset_is_found_in_every_norm() {
 fn measures_combine_norms_and_facts() {
     let ratio = Scalar::Binary(
         Binary::Divide,
-        Box::new(Scalar::Norm(Norm::L1, difference())),
-        Box::new(Scalar::Norm(Norm::L1, Box::new(Field::Reference(0)))),
+        Box::new(Scalar::Norm(Norm::L1, 1, difference())),
+        Box::new(Scalar::Norm(Norm::L1, 1, Box::new(Field::Reference(0)))),
     );
     // A reference alone has no empty bins: ∫ x² + 1 and ∫ x² + 3 over 0…2.
     assert_close(measured(measure(ratio)).expect("fits"), 0.3 / (16.0 / 3.0 + 8.0));
-    let norm = |norm| measured(measure(Scalar::Norm(norm, difference()))).expect("fits");
+    let norm = |norm| measured(measure(Scalar::Norm(norm, 1, difference()))).expect("fits");
     assert_close(norm(Norm::Integral), 0.15);
     assert_close(norm(Norm::Mean), 0.1);
     assert_close(norm(Norm::Maximum), 0.1);
@@ -174,27 +174,31 @@ fn measures_restrict_space_and_time() {
     let within = Measure {
         over: Some((0, 0.5, 1.0)),
         times: Some(vec![3.0]),
-        ..measure(Scalar::Norm(Norm::L1, Box::new(Field::Output(OutputKind::Profile, A))))
+        ..measure(Scalar::Norm(Norm::L1, 1, Box::new(Field::Output(OutputKind::Profile, A))))
     };
     // One bin, centre 0.75, at 3 s.
     assert_close(measured(within).expect("fits"), 0.5 * (0.75 * 0.75 + 0.25 / 12.0 + 3.1));
     let axis_left_out =
-        Measure { over: Some((1, 5.0, 6.0)), ..measure(Scalar::Norm(Norm::L1, difference())) };
+        Measure { over: Some((1, 5.0, 6.0)), ..measure(Scalar::Norm(Norm::L1, 1, difference())) };
     assert_close(measured(axis_left_out).expect("fits"), 0.3);
 }
 
 #[test]
 fn measures_that_cannot_be_had_say_why() {
-    let no_such_time = Measure { times: Some(vec![2.0]), ..measure(Scalar::Norm(Norm::L1, difference())) };
-    let plain_number = measure(Scalar::Norm(Norm::L1, Box::new(Field::Number(1.0))));
-    let other_species =
-        measure(Scalar::Norm(Norm::L1, Box::new(Field::Output(OutputKind::Profile, Quantity::Species(7)))));
+    let no_such_time = Measure { times: Some(vec![2.0]), ..measure(Scalar::Norm(Norm::L1, 1, difference())) };
+    let no_such_output = measure(Scalar::Norm(Norm::L1, 2, Box::new(Field::Number(1.0))));
+    let other_species = measure(Scalar::Norm(
+        Norm::L1,
+        1,
+        Box::new(Field::Output(OutputKind::Profile, Quantity::Species(7))),
+    ));
     let mixed = Field::Binary(
         Binary::Add,
         Box::new(Field::Output(OutputKind::Profile, A)),
         Box::new(Field::Output(OutputKind::Total, A)),
     );
-    for wrong in [no_such_time, plain_number, other_species, measure(Scalar::Norm(Norm::L2, Box::new(mixed)))]
+    for wrong in
+        [no_such_time, no_such_output, other_species, measure(Scalar::Norm(Norm::L2, 1, Box::new(mixed)))]
     {
         let sentence = measured(wrong).expect_err("cannot be had");
         assert!(

@@ -7,7 +7,7 @@ use super::{Plan, hash};
 use serde::{Deserialize, Serialize};
 
 /// Version of this document's layout.
-pub const DOCUMENT_VERSION: u32 = 1;
+pub const DOCUMENT_VERSION: u32 = 2;
 
 /// A text that belongs to a scene.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -5,7 +5,7 @@
 
 use super::tape::{Binary, Tape, Unary};
 use super::{OutputKind, Quantity};
-pub use crate::scenario::{Fact, Norm};
+pub use crate::scenario::{Fact, Norm, SAME_TIME};
 use serde::{Deserialize, Serialize};
 
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -54,7 +54,8 @@ pub struct Measure {
 pub enum Scalar {
     Number(f64),
     Fact(Fact),
-    Norm(Norm, Box<Field>),
+    /// On the bins and times of an output of the plan, given by its index.
+    Norm(Norm, usize, Box<Field>),
     Unary(Unary, Box<Scalar>),
     Binary(Binary, Box<Scalar>, Box<Scalar>),
 }
@@ -66,6 +67,7 @@ pub enum Field {
     Number(f64),
     /// Centre of the bin along axis 0, 1, 2 for x, y, z; m.
     Position(usize),
+    /// From the output of that kind with the quantity and with the bins and times of the norm's.
     Output(OutputKind, Quantity),
     /// Index into `Evaluation::references`.
     Reference(usize),

@@ -238,7 +238,7 @@ fn lower_scalar(scalar: &scenario::Scalar) -> evaluation::Scalar {
     match scalar {
         From::Number(value) => To::Number(*value),
         From::Fact(fact) => To::Fact(*fact),
-        From::Norm(norm, field) => To::Norm(*norm, Box::new(lower_field(field))),
+        From::Norm(norm, output_idx, field) => To::Norm(*norm, *output_idx, Box::new(lower_field(field))),
         From::Unary(operator, a) => To::Unary(*operator, Box::new(lower_scalar(a))),
         From::Binary(operator, a, b) => {
             To::Binary(*operator, Box::new(lower_scalar(a)), Box::new(lower_scalar(b)))

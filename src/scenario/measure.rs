@@ -5,8 +5,9 @@ use super::collect::Statements;
 use super::expression::Type;
 use super::model::species_index;
 use super::observe::{OUTPUTS, time_list};
+use super::places::{Places, Results, place_of};
 use super::scope::Origin;
-use super::{Measure, Output, OutputKind, Reference, Target};
+use super::{Measure, Output, OutputKind, Reference};
 use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{D007, M015, U101, U103, U108};
 use crate::maths::operator::{Binary, Unary};
@@ -20,7 +21,8 @@ use serde::{Deserialize, Serialize};
 pub enum Scalar {
     Number(f64),
     Fact(Fact),
-    Norm(Norm, Box<Field>),
+    /// On the bins and times of an output of the scenario, given by its index.
+    Norm(Norm, usize, Box<Field>),
     Unary(Unary, Box<Scalar>),
     Binary(Binary, Box<Scalar>, Box<Scalar>),
 }
@@ -85,7 +87,7 @@ const FACTS: &[(&str, Fact, Dimension)] = &[
     ("steps", Fact::Steps, Dimension::NONE),
 ];
 
-const NORMS: &[(&str, Norm)] = &[
+pub(super) const NORMS: &[(&str, Norm)] = &[
     ("l1", Norm::L1),
     ("l2", Norm::L2),
     ("linf", Norm::LInf),
@@ -99,8 +101,8 @@ const NORMS: &[(&str, Norm)] = &[
 /// A checked part of a measure.
 enum Part {
     Scalar(Scalar, Type),
-    /// A field and the kind of output on whose bins it lives; `None` fits any bins.
-    Field(Field, Type, Option<OutputKind>),
+    /// A field and the outputs on whose bins and times it can live.
+    Field(Field, Type, Places),
 }
 
 impl Part {
@@ -109,14 +111,6 @@ impl Part {
             Part::Scalar(_, kind) | Part::Field(_, kind, _) => *kind,
         }
     }
-}
-
-/// What measures may speak of.
-struct Results<'r> {
-    outputs: &'r [Output],
-    references: &'r [Reference],
-    /// Whether these lists are whole, so that an absent entry is the user's mistake.
-    are_whole: bool,
 }
 
 pub(super) fn measures<'a>(
@@ -128,10 +122,10 @@ pub(super) fn measures<'a>(
 ) -> (Vec<Measure>, bool) {
     let are_whole =
         outputs.len() == statements.outputs.len() && references.len() == statements.references.len();
-    let results = Results { outputs, references, are_whole };
     let mut list = Vec::new();
     for (span, written) in &statements.measures {
-        list.extend(measure(checker, &results, *span, written, duration));
+        let results = Results { outputs, references, are_whole, times: None, decided: Vec::new() };
+        list.extend(measure(checker, results, *span, written, duration));
     }
     let is_right = list.len() == statements.measures.len();
     (list, is_right)
@@ -139,16 +133,18 @@ pub(super) fn measures<'a>(
 
 fn measure<'a>(
     checker: &mut Checker<'a>,
-    results: &Results<'_>,
+    mut results: Results<'_>,
     span: Span,
     written: &'a tree::Measure,
     duration: Option<f64>,
 ) -> Option<Measure> {
-    let part = part(checker, results, &written.value);
     let times = match &written.times {
         None => Some(None),
         Some(list) => time_list(checker, list, duration).map(Some),
     };
+    results.times = times.clone().flatten();
+    results.decide(&written.value, &checker.scope);
+    let part = part(checker, &results, &written.value);
     let over = match &written.over {
         None => Some(None),
         Some(axis) => over(checker, axis).map(Some),
@@ -223,36 +219,26 @@ fn path_part<'a>(
             return Some(Part::Scalar(Scalar::Fact(*fact), Type::Number(*dimension)));
         }
         if let Some(&(_, index)) = checker.axes.iter().find(|(axis, _)| *axis == name.value) {
-            return Some(Part::Field(Field::Position(index), Type::Number(Dimension::LENGTH), None));
+            return Some(Part::Field(
+                Field::Position(index),
+                Type::Number(Dimension::LENGTH),
+                Places::default(),
+            ));
         }
         if let Some(entry) = checker.scope.get_mut(&name.value)
             && let Origin::Reference(idx) = entry.origin
         {
             entry.n_uses += 1;
-            return reference_part(checker, results, idx);
+            return reference_part(checker, results, idx, expr);
         }
         return constant(checker, expr);
     }
     let kind = checker.word(&path[0], "an output", OUTPUTS)?;
     let species: Vec<Option<usize>> = path[1..].iter().map(|name| species_index(checker, name)).collect();
     let species: Vec<usize> = species.into_iter().collect::<Option<_>>()?;
-    let target = match (kind, species.as_slice()) {
-        (OutputKind::Covariance | OutputKind::Mixing, [a]) => Some(FieldTarget::Pair(*a, *a)),
-        (OutputKind::Covariance | OutputKind::Mixing, [a, b]) => Some(FieldTarget::Pair(*a, *b)),
-        (OutputKind::Profile | OutputKind::Map | OutputKind::Total, [a]) => Some(FieldTarget::Species(*a)),
-        _ => None,
-    };
-    let has = |output: &&Output| {
-        output.kind == kind
-            && match target {
-                Some(FieldTarget::Species(a)) => output.species.contains(&a),
-                Some(FieldTarget::Pair(a, b)) => {
-                    output.pairs.contains(&(a, b)) || output.pairs.contains(&(b, a))
-                }
-                None => false,
-            }
-    };
-    let Some(output) = results.outputs.iter().find(has) else {
+    let target = FieldTarget::of(kind, &species);
+    let places = target.map(|target| results.of_output(kind, target)).unwrap_or_default();
+    let Some(&output) = places.candidates().first() else {
         if results.are_whole {
             let words: Vec<&str> = path.iter().map(|name| name.value.as_str()).collect();
             checker.report(
@@ -266,7 +252,9 @@ fn path_part<'a>(
         return None;
     };
     let target = match target? {
-        FieldTarget::Pair(a, b) if !output.pairs.contains(&(a, b)) => FieldTarget::Pair(b, a),
+        FieldTarget::Pair(a, b) if !results.outputs[output].pairs.contains(&(a, b)) => {
+            FieldTarget::Pair(b, a)
+        }
         other => other,
     };
     let first = *species.first()?;
@@ -275,29 +263,39 @@ fn path_part<'a>(
         OutputKind::Mixing => Dimension::NONE,
         kind => kind.dimension(concentration, checker.axes.len()),
     };
-    Some(Part::Field(Field::Output(kind, target), Type::Number(dimension), Some(kind)))
+    Some(Part::Field(Field::Output(kind, target), Type::Number(dimension), places))
 }
 
-fn reference_part(checker: &mut Checker<'_>, results: &Results<'_>, idx: usize) -> Option<Part> {
+fn reference_part(
+    checker: &mut Checker<'_>,
+    results: &Results<'_>,
+    idx: usize,
+    expr: &tree::Expr,
+) -> Option<Part> {
     // References that are wrong are reported where they stand.
     results.are_whole.then_some(())?;
     let reference = &results.references[idx];
-    let kind = reference
-        .target
-        .outputs()
-        .iter()
-        .copied()
-        .find(|kind| results.outputs.iter().any(|output| output.kind == *kind))
-        .unwrap_or(reference.target.outputs()[0]);
-    let species = match reference.target {
-        Target::Concentration(a) | Target::Total(a) | Target::Covariance(a, _) | Target::Mixing(a, _) => a,
-    };
-    let concentration = checker.species_dimensions[species].unwrap_or(Dimension::MOLAR_CONCENTRATION);
+    let places = results.of_reference(idx);
+    if places.candidates().is_empty() {
+        let kinds: Vec<String> =
+            reference.target.outputs().iter().map(|kind| format!("`output {}`", kind.word())).collect();
+        checker.report(
+            Diagnostic::error(M015, format!("no output gives what reference `{}` predicts", reference.name))
+                .at(expr.span, "without bins and times")
+                .also(reference.span, "the reference")
+                .found("no such output")
+                .expected(format!("{} of its species", kinds.join(" or "))),
+        );
+        return None;
+    }
+    let kind = reference.target.outputs()[0];
+    let concentration = checker.species_dimensions[reference.target.species()];
+    let concentration = concentration.unwrap_or(Dimension::MOLAR_CONCENTRATION);
     let dimension = match kind {
         OutputKind::Mixing => Dimension::NONE,
         kind => kind.dimension(concentration, checker.axes.len()),
     };
-    Some(Part::Field(Field::Reference(idx), Type::Number(dimension), Some(kind)))
+    Some(Part::Field(Field::Reference(idx), Type::Number(dimension), places))
 }
 
 fn apply_unary(operator: Unary, part: Part) -> Part {
@@ -330,7 +328,7 @@ fn call_part<'a>(
     };
     let inner = part(checker, results, &argument.value)?;
     let Some(norm) = norm else { return Some(apply_unary(Unary::Abs, inner)) };
-    let Part::Field(field, kind, on) = inner else {
+    let Part::Field(field, kind, places) = inner else {
         checker.report(
             Diagnostic::error(U108, format!("`{name}` is a norm of a field"))
                 .at(argument.value.span, "one number")
@@ -339,17 +337,10 @@ fn call_part<'a>(
         );
         return None;
     };
-    if on.is_none() {
-        checker.report(
-            Diagnostic::error(U108, format!("`{name}` needs an output"))
-                .at(argument.value.span, "on which bins?")
-                .found("positions only")
-                .expected("an expression with an output such as `profile.A`"),
-        );
-        return None;
-    }
+    let output_idx = place_of(checker, results, name, &places, argument.value.span)?;
+    let on = results.outputs[output_idx].kind;
     let dimension = norm_dimension(norm, kind.dimension()?, on, checker.axes.len());
-    Some(Part::Scalar(Scalar::Norm(norm, Box::new(field)), Type::Number(dimension)))
+    Some(Part::Scalar(Scalar::Norm(norm, output_idx, Box::new(field)), Type::Number(dimension)))
 }
 
 /// A part to a constant power.
@@ -380,11 +371,11 @@ fn power_part(base: Part, exponent: Part, checker: &mut Checker<'_>, expr: &tree
 }
 
 /// Norms that integrate over space carry the volume of the bins.
-fn norm_dimension(norm: Norm, field: Dimension, on: Option<OutputKind>, n_axes: usize) -> Dimension {
+fn norm_dimension(norm: Norm, field: Dimension, on: OutputKind, n_axes: usize) -> Dimension {
     let n_integrated = match on {
-        Some(OutputKind::Profile | OutputKind::Covariance) => 1,
-        Some(OutputKind::Map) => n_axes as i32,
-        Some(OutputKind::Total | OutputKind::Mixing | OutputKind::Particles) | None => 0,
+        OutputKind::Profile | OutputKind::Covariance => 1,
+        OutputKind::Map => n_axes as i32,
+        OutputKind::Total | OutputKind::Mixing | OutputKind::Particles => 0,
     };
     let power = match norm {
         Norm::L1 | Norm::Integral => (n_integrated, 1),
@@ -436,10 +427,8 @@ fn binary_part(
         (Part::Scalar(a, _), Part::Scalar(b, _)) => {
             Some(Part::Scalar(Scalar::Binary(op, Box::new(a), Box::new(b)), kind))
         }
-        (Part::Field(a, _, on), Part::Field(b, _, other))
-            if on == other || on.is_none() || other.is_none() =>
-        {
-            Some(Part::Field(Field::Binary(op, Box::new(a), Box::new(b)), kind, on.or(other)))
+        (Part::Field(a, _, on), Part::Field(b, _, other)) if on.can_join(&other) => {
+            Some(Part::Field(Field::Binary(op, Box::new(a), Box::new(b)), kind, on.both(&other)))
         }
         (Part::Field(a, _, on), Part::Scalar(Scalar::Number(b), _)) => {
             Some(Part::Field(Field::Binary(op, Box::new(a), Box::new(Field::Number(b))), kind, on))

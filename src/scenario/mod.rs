@@ -11,6 +11,7 @@ mod geometry;
 mod measure;
 mod model;
 mod observe;
+mod places;
 mod quantity;
 mod reactions;
 mod reference;
@@ -24,6 +25,7 @@ use expression::Expr;
 
 pub use collect::resolve;
 pub use measure::{Fact, Field, FieldTarget, Norm, Scalar};
+pub use places::SAME_TIME;
 
 /// What the command line adds to a scene.
 #[derive(Debug, Clone, Default)]

@@ -32,7 +32,7 @@ impl Target {
         }
     }
 
-    fn is_in(self, output: &Output) -> bool {
+    pub(super) fn is_in(self, output: &Output) -> bool {
         self.outputs().contains(&output.kind)
             && match self {
                 Target::Concentration(species) | Target::Total(species) => output.species.contains(&species),
@@ -42,7 +42,7 @@ impl Target {
             }
     }
 
-    fn species(self) -> usize {
+    pub(super) fn species(self) -> usize {
         match self {
             Target::Concentration(a) | Target::Total(a) | Target::Covariance(a, _) | Target::Mixing(a, _) => {
                 a

@@ -104,7 +104,7 @@ fn renumber_evaluation(draft: &mut Draft, renumbered: &[Option<usize>], quantity
         draft.evaluation.references.iter().map(|reference| lives(&reference.target)).collect();
     retain_by(&mut draft.evaluation.references, &is_kept);
     draft.evaluation.references.iter_mut().for_each(|reference| quantity(&mut reference.target));
-    // A measure can only name references that some output is compared with, so none is lost here.
+    // A measure can only name references that some output is compared with (M015), so none is lost here.
     for measure in &mut draft.evaluation.measures {
         renumber_scalar(&mut measure.value, &is_kept, quantity);
     }
@@ -113,7 +113,7 @@ fn renumber_evaluation(draft: &mut Draft, renumbered: &[Option<usize>], quantity
 fn renumber_scalar(scalar: &mut Scalar, is_kept: &[bool], quantity: &impl Fn(&mut Quantity)) {
     match scalar {
         Scalar::Number(_) | Scalar::Fact(_) => {}
-        Scalar::Norm(_, field) => renumber_field(field, is_kept, quantity),
+        Scalar::Norm(_, _, field) => renumber_field(field, is_kept, quantity),
         Scalar::Unary(_, a) => renumber_scalar(a, is_kept, quantity),
         Scalar::Binary(_, a, b) => {
             renumber_scalar(a, is_kept, quantity);
