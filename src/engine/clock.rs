@@ -39,7 +39,8 @@ impl Clock {
 
     /// Processor seconds of all threads of the process; wall seconds where the system does not tell.
     pub fn cpu(&self) -> f64 {
-        since(self.cpu_start).map_or_else(|| self.wall(), |cpu| cpu.saturating_sub(self.cpu_away).as_secs_f64())
+        since(self.cpu_start)
+            .map_or_else(|| self.wall(), |cpu| cpu.saturating_sub(self.cpu_away).as_secs_f64())
     }
 }
 

@@ -34,6 +34,7 @@ pub enum RunError {
     MassLost {
         step: u64,
         component: String,
+        /// Not finite if the values are numbers and their sum is none.
         defect: f64,
     },
     OutOfMemory {
@@ -67,6 +68,9 @@ impl fmt::Display for RunError {
             }
             Self::NegativeConcentration { step, particle, component, value } => {
                 write!(f, "step {step}: `{component}` of particle {particle} became negative ({value:e})")
+            }
+            Self::MassLost { step, component, defect } if !defect.is_finite() => {
+                write!(f, "step {step}: the amount of `{component}` is not a finite number")
             }
             Self::MassLost { step, component, defect } => {
                 write!(f, "step {step}: the amount of `{component}` changed by {defect:e} of itself")

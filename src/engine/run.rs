@@ -227,7 +227,7 @@ impl<'a, const D: usize> Run<'a, D> {
         self.program.plan.components[idx].name.clone()
     }
 
-    /// Names the first particle whose value is not finite, or the largest if only a sum is not.
+    /// Names the first particle whose value is not finite; if only a sum is not, the amount.
     #[cold]
     fn find_non_finite(&self, step: u64) -> RunError {
         let n_slots = self.program.roles.len();
@@ -242,7 +242,7 @@ impl<'a, const D: usize> Run<'a, D> {
         }
         let column = self.means.totals.iter().position(|total| !total.is_finite()).unwrap_or(0);
         let component = self.component_name(column / n_slots);
-        RunError::NonFiniteConcentration { step: step + 1, particle: 0, component }
+        RunError::MassLost { step: step + 1, component, defect: f64::INFINITY }
     }
 
     /// Names the particle behind a trouble.
@@ -305,3 +305,7 @@ fn limits<const D: usize>(program: &Program<D>, before: &[Amount]) -> Vec<f64> {
         })
         .collect()
 }
+
+#[cfg(test)]
+#[path = "run_tests.rs"]
+mod tests;
