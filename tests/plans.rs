@@ -174,7 +174,10 @@ fn stages_follow_from_what_is_left() {
 #[test]
 fn a_plan_document_reads_back_and_notices_changes() {
     let compiled = compile(COLUMN);
-    let text = document::write(&compiled, &[document::EmbeddedSource::new("scene.lam", COLUMN)]);
+    let sources = Sources::single("scene.lam", COLUMN);
+    let checked = lamella::check(sources, &Settings::default(), &Options::default());
+    let scenario = checked.scenario.expect("the scene is right");
+    let text = document::write(&compiled, &scenario, &[document::EmbeddedSource::new("scene.lam", COLUMN)]);
     let (plan, evaluation) = document::read(&text).expect("the document reads back");
     assert_eq!(plan, compiled.plan);
     assert_eq!(evaluation, compiled.evaluation);

@@ -16,11 +16,11 @@ pub(crate) fn load(path: &Path, settings: &Settings, without_passes: bool) -> Re
     Ok(lamella::check(Sources::single(display_name(path), text), settings, &options))
 }
 
-/// `name=value` of `--set`; the value is an expression of the language.
+/// `name=value` of `--set`, as it was typed; the value is an expression of the language.
 pub(crate) fn parse_setting(text: &str) -> Result<(String, String), String> {
     match text.split_once('=') {
         Some((name, value)) if !name.trim().is_empty() && !value.trim().is_empty() => {
-            Ok((name.trim().to_owned(), value.trim().to_owned()))
+            Ok((name.to_owned(), value.to_owned()))
         }
         _ => Err("expected name=value, such as v=2cm/s".to_owned()),
     }

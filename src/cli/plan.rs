@@ -64,7 +64,8 @@ fn product(arguments: &Arguments, checked: &Checked) -> Option<String> {
         Some(Emit::Yaml) => {
             let source = checked.sources.file(FileId(0));
             let text = syntax::format(&checked.file, &source.text);
-            compiled.map(|compiled| document::write(compiled, &[EmbeddedSource::new(&source.name, text)]))
+            let sources = [EmbeddedSource::new(&source.name, text)];
+            Some(document::write(compiled?, scenario?, &sources))
         }
         None => compiled.map(|compiled| {
             let title = scenario.and_then(|scenario| scenario.title.as_deref());

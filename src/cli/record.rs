@@ -10,27 +10,30 @@ use lamella::plan::document::{self, EmbeddedSource};
 use lamella::scenario::Scenario;
 use lamella::source::FileId;
 use lamella::syntax;
-use lamella::table::{Parameter, PointRow, Record, Status, Value, si_text};
+use lamella::table::{Parameter, PointRow, Record, Status, Swept, SweptValue, Value, si_text};
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
 
 /// The provenance of a run; it depends on nothing but the scene, the settings and the version.
-pub(crate) fn record(checked: &Checked, compiled: &Compiled, scene_name: &str) -> Record {
+pub(crate) fn record(
+    checked: &Checked,
+    scenario: &Scenario,
+    compiled: &Compiled,
+    scene_name: &str,
+) -> Record {
     let text = &checked.sources.file(FileId(0)).text;
     let scene_text = syntax::format(&checked.file, text);
     let sources = [EmbeddedSource::new(format!("{scene_name}.lam"), scene_text.clone())];
     let mut record = Record {
         scene_name: scene_name.to_owned(),
         plan_hash: compiled.hash.clone(),
-        plan_yaml: document::write(compiled, &sources),
+        plan_yaml: document::write(compiled, scenario, &sources),
         version: VERSION.to_owned(),
         scene_source: text.clone(),
         scene_text,
         ..Record::default()
     };
-    if let Some(scenario) = &checked.scenario {
-        add_scenario(&mut record, scenario);
-    }
+    add_scenario(&mut record, scenario);
     record
 }
 
@@ -51,6 +54,16 @@ fn add_scenario(record: &mut Record, scenario: &Scenario) {
     record.parameters = parameters.collect();
 }
 
+/// The parameters that the command line set, as columns in SI.
+pub(crate) fn swept(scenario: &Scenario) -> Vec<Swept> {
+    let set = scenario.parameters.iter().filter(|parameter| parameter.is_set);
+    let column = |parameter: &lamella::scenario::Parameter| Swept {
+        name: parameter.name.clone(),
+        value: SweptValue::Real(parameter.value, si_text(parameter.dimension)),
+    };
+    set.map(column).collect()
+}
+
 /// The measures of a scene as columns; one that is not a number has no value.
 pub(crate) fn measures(evaluated: &Evaluated) -> Vec<Value> {
     let column = |measure: &lamella::measure::MeasureValue| Value {
@@ -62,13 +75,18 @@ pub(crate) fn measures(evaluated: &Evaluated) -> Vec<Value> {
 }
 
 /// The row of a run that is done.
-pub(crate) fn point(compiled: &Compiled, outcome: &Outcome, values: Vec<Value>) -> PointRow {
+pub(crate) fn point(
+    compiled: &Compiled,
+    swept: Vec<Swept>,
+    outcome: &Outcome,
+    values: Vec<Value>,
+) -> PointRow {
     let plan = &compiled.plan;
     PointRow {
         point: 0,
         replicate: 0,
         key: compiled.hash.clone(),
-        swept: Vec::new(),
+        swept,
         seed: plan.seed,
         status: Status::Done,
         error_code: None,

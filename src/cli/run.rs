@@ -14,7 +14,7 @@ use lamella::measure::{self, Evaluated};
 use lamella::plan::compile::Compiled;
 use lamella::report;
 use lamella::scenario::Settings;
-use lamella::table::{Record, TableError, Writer};
+use lamella::table::{Record, Swept, TableError, Writer};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -67,14 +67,17 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
     let settings = Settings { set: arguments.set.clone(), seed: arguments.seed };
     let mut checked = load::load(&arguments.file, &settings, arguments.no_passes)?;
     terminal.diagnostics(&checked.diagnostics, &checked.sources);
-    let Some(compiled) = checked.compiled.take() else { return Ok(Exit::SceneWrong) };
+    let (Some(compiled), Some(scenario)) = (checked.compiled.take(), checked.scenario.take()) else {
+        return Ok(Exit::SceneWrong);
+    };
     let compile_wall = begin.elapsed().as_secs_f64();
     terminal.remark(&announcement(&compiled));
     if !compiled.left_out.is_empty() {
         terminal.diagnostics(&[compiled.left_out_note()], &checked.sources);
     }
     let job = Job {
-        record: record::record(&checked, &compiled, &scene_name(&arguments.file)),
+        record: record::record(&checked, &scenario, &compiled, &scene_name(&arguments.file)),
+        swept: record::swept(&scenario),
         folder: arguments.folder(),
         n_threads: arguments.n_threads(),
         wants_figure: arguments.plot,
@@ -100,6 +103,7 @@ fn announcement(compiled: &Compiled) -> String {
 struct Job {
     compiled: Compiled,
     record: Record,
+    swept: Vec<Swept>,
     folder: PathBuf,
     n_threads: usize,
     wants_figure: bool,
@@ -187,7 +191,7 @@ impl Job {
     fn point(&self, found: &Found) -> lamella::table::PointRow {
         let errors = report::error_values(&self.compiled.plan, self.record.n_axes, &found.evaluated.errors);
         let values = errors.into_iter().chain(record::measures(&found.evaluated)).collect();
-        let mut row = record::point(&self.compiled, &found.outcome, values);
+        let mut row = record::point(&self.compiled, self.swept.clone(), &found.outcome, values);
         row.compile_wall = self.compile_wall;
         row.threads = u32::try_from(self.n_threads).unwrap_or(u32::MAX);
         row.started = found.started;

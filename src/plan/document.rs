@@ -4,6 +4,7 @@ use super::compile::Compiled;
 use super::evaluation::Evaluation;
 use super::passes::LeftOut;
 use super::{Plan, hash};
+use crate::scenario::Scenario;
 use serde::{Deserialize, Serialize};
 
 /// Version of this document's layout.
@@ -25,10 +26,31 @@ impl EmbeddedSource {
     }
 }
 
+/// `--set name=value`, as it was given.
+#[derive(Serialize)]
+struct Setting<'a> {
+    name: &'a str,
+    value: &'a str,
+}
+
+/// A `param` of the scene with the value it had.
+#[derive(Serialize)]
+struct Parameter<'a> {
+    name: &'a str,
+    /// In SI.
+    value: f64,
+    si_unit: String,
+    /// As written; null for a value that is worked out.
+    unit: Option<&'a str>,
+    is_set: bool,
+}
+
 #[derive(Serialize)]
 struct WrittenDocument<'a> {
     document: u32,
     plan_hash: &'a str,
+    settings: Vec<Setting<'a>>,
+    parameters: Vec<Parameter<'a>>,
     plan: &'a Plan,
     evaluation: &'a Evaluation,
     left_out: &'a [LeftOut],
@@ -43,11 +65,21 @@ struct ReadDocument {
     evaluation: Evaluation,
 }
 
-/// The YAML text of a compiled plan.
-pub fn write(compiled: &Compiled, sources: &[EmbeddedSource]) -> String {
+/// The YAML text of a compiled plan, with what the scene and the command line set.
+pub fn write(compiled: &Compiled, scenario: &Scenario, sources: &[EmbeddedSource]) -> String {
+    let settings = scenario.settings.iter().map(|(name, value)| Setting { name, value });
+    let parameters = scenario.parameters.iter().map(|parameter| Parameter {
+        name: &parameter.name,
+        value: parameter.value,
+        si_unit: parameter.dimension.unit_text(),
+        unit: parameter.unit.as_deref(),
+        is_set: parameter.is_set,
+    });
     let document = WrittenDocument {
         document: DOCUMENT_VERSION,
         plan_hash: &compiled.hash,
+        settings: settings.collect(),
+        parameters: parameters.collect(),
         plan: &compiled.plan,
         evaluation: &compiled.evaluation,
         left_out: &compiled.left_out,

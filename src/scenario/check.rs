@@ -35,6 +35,8 @@ pub(super) struct Checker<'a> {
     /// Concentration dimension of each species, as far as known.
     pub species_dimensions: Vec<Option<Dimension>>,
     pub(super) call_stack: Vec<String>,
+    /// Constants whose values are being worked out, each for the one before it.
+    pub(super) running: Vec<String>,
 }
 
 impl<'a> Checker<'a> {
@@ -214,19 +216,15 @@ impl<'a> Checker<'a> {
             Progress::Known(value, kind) => return Some((value, kind)),
             Progress::Wrong => return None,
             Progress::Running => {
-                let span = entry.span;
                 entry.progress = Progress::Wrong;
-                self.report(
-                    Diagnostic::error(D006, format!("`{name}` is defined by itself"))
-                        .at(span, "its value needs its own value")
-                        .found("a circle of definitions")
-                        .expected("definitions that end in numbers"),
-                );
+                self.report_circle(name);
                 return None;
             }
             Progress::Untouched => entry.progress = Progress::Running,
         }
+        self.running.push(name.to_owned());
         let checked = self.check(value, Allow::CONSTANT);
+        self.running.pop();
         let checked = checked.and_then(|expr| match (expr.value(), expr.kind) {
             (Some(value), kind @ (Type::Zero | Type::Number(_))) => Some((value, kind)),
             _ => {
@@ -247,6 +245,20 @@ impl<'a> Checker<'a> {
             };
         }
         checked
+    }
+
+    /// Constants that need each other: every link of the circle with what it needs.
+    fn report_circle(&mut self, name: &str) {
+        let first = self.running.iter().position(|running| running == name).unwrap_or(0);
+        let links: Vec<(&str, Span)> = self.running[first..]
+            .iter()
+            .filter_map(|link| Some((link.as_str(), self.scope.get(link)?.place_of_value())))
+            .collect();
+        let message = Diagnostic::error(D006, format!("`{name}` is defined by itself"));
+        let message = label_circle(message, &links, "its value needs")
+            .found("a circle of definitions")
+            .expected("definitions that end in numbers");
+        self.report(message);
     }
 
     fn unary(&mut self, operator: UnaryOperator, operand: Expr, span: Span) -> Option<Expr> {
@@ -372,4 +384,17 @@ impl<'a> Checker<'a> {
         };
         Some(Expr::select(condition, then, otherwise, kind, span))
     }
+}
+
+/// Labels the links of a circle, the first one as the place of the message.
+pub(super) fn label_circle(mut message: Diagnostic, links: &[(&str, Span)], needs: &str) -> Diagnostic {
+    for (idx, (_, span)) in links.iter().enumerate() {
+        let next = links[(idx + 1) % links.len()].0;
+        message = match (idx, links.len()) {
+            (0, 1) => message.at(*span, format!("{needs} itself")),
+            (0, _) => message.at(*span, format!("{needs} `{next}`")),
+            _ => message.also(*span, format!("{needs} `{next}`")),
+        };
+    }
+    message
 }

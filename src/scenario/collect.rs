@@ -1,11 +1,12 @@
 //! The phase itself: statements gathered, names defined, every part resolved in its turn.
 
-use super::check::{Allow, Checker};
+use super::check::Checker;
 use super::expression::Type;
 use super::scope::{Origin, Progress, Scope};
+use super::settings::{check_setting, read_settings, unit_as_written};
 use super::{Parameter, Scenario, Settings};
-use crate::diagnostic::codes::{D001, D010, M001, M002, P001, P002, U104};
-use crate::diagnostic::{Diagnostic, did_you_mean};
+use crate::diagnostic::Diagnostic;
+use crate::diagnostic::codes::{D001, D010, M001, M002, P002};
 use crate::source::{Sources, Span};
 use crate::syntax::tree::{self, StatementKind};
 
@@ -46,7 +47,7 @@ pub fn resolve(
     has_syntax_errors: bool,
 ) -> (Option<Scenario>, Vec<Diagnostic>) {
     let mut diagnostics = Vec::new();
-    let overrides = read_overrides(file, sources, settings, &mut diagnostics);
+    let overrides = read_settings(file, sources, settings, &mut diagnostics);
     let statements = gather(file, &mut diagnostics);
     let mut checker = Checker {
         scope: Scope::default(),
@@ -54,6 +55,7 @@ pub fn resolve(
         axes: super::geometry::axis_names(&statements),
         species_dimensions: vec![None; statements.species.len()],
         call_stack: Vec::new(),
+        running: Vec::new(),
     };
     define_names(&mut checker, &statements, &overrides);
     let scenario = build(&mut checker, &statements, settings, file, has_syntax_errors);
@@ -230,6 +232,11 @@ fn build<'a>(
     Some(Scenario {
         title: statements.title.map(|title| title.value.clone()),
         citations: statements.citations.iter().map(|text| text.value.clone()).collect(),
+        settings: settings
+            .set
+            .iter()
+            .map(|(name, value)| (name.trim().into(), value.trim().into()))
+            .collect(),
         parameters,
         species: species.all_right()?,
         reactions: reactions?,
@@ -287,16 +294,16 @@ fn parameters<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> Vec
             .as_ref()
             .and_then(|range| checker.range(range, &format!("the range of `{name}`"), dimension));
         let Some((value, _)) = value else { continue };
+        let given = match checker.scope.get(name).map(|entry| entry.origin) {
+            Some(Origin::Param(given)) => given,
+            _ => *statement,
+        };
         if let Some((low, high, _)) = range
             && !(low.value..=high.value).contains(&value)
         {
-            let span = match checker.scope.get(name).map(|entry| entry.origin) {
-                Some(Origin::Param(set)) => set.value.span,
-                _ => statement.value.span,
-            };
             checker.report(
                 Diagnostic::error(P002, format!("`{name}` lies outside of its range"))
-                    .at(span, "this value")
+                    .at(given.value.span, "this value")
                     .also(low.span.to(high.span), "this range")
                     .found(format!("{value} (SI)"))
                     .expected(format!("{} to {} (SI)", low.value, high.value)),
@@ -306,33 +313,13 @@ fn parameters<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> Vec
             name: name.clone(),
             value,
             dimension: dimension.or(range.map(|(_, _, dimension)| dimension)).unwrap_or_default(),
+            unit: unit_as_written(&given.value),
+            is_set: !std::ptr::eq(given, *statement),
             doc: statement.doc.as_ref().map(|doc| doc.value.clone()),
             span: statement.name.span,
         });
     }
     list
-}
-
-/// A setting of the command line keeps the dimension that the scene gives its parameter.
-fn check_setting<'a>(checker: &mut Checker<'a>, written: &'a tree::Param, kind: Option<Type>) {
-    let set = match checker.scope.get(&written.name.value).map(|entry| entry.origin) {
-        Some(Origin::Param(set)) if !std::ptr::eq(set, written) => set,
-        _ => return,
-    };
-    let own = checker.check(&written.value, Allow::CONSTANT);
-    let (Some(own), Some(kind)) = (own, kind) else { return };
-    if own.kind.unify(kind).is_none() {
-        checker.report(
-            Diagnostic::error(
-                U104,
-                format!("`{}` is set to a value of another dimension", written.name.value),
-            )
-            .at(set.value.span, format!("this is {}", kind.describe()))
-            .also(written.value.span, format!("this is {}", own.kind.describe()))
-            .found(kind.describe())
-            .expected(own.kind.describe()),
-        );
-    }
 }
 
 fn report_unused(scope: &Scope<'_>, diagnostics: &mut Vec<Diagnostic>) {
@@ -346,74 +333,4 @@ fn report_unused(scope: &Scope<'_>, diagnostics: &mut Vec<Diagnostic>) {
             );
         }
     }
-}
-
-/// `--set name=value`: each becomes a parameter with a source of its own.
-fn read_overrides(
-    file: &tree::File,
-    sources: &mut Sources,
-    settings: &Settings,
-    diagnostics: &mut Vec<Diagnostic>,
-) -> Vec<tree::Param> {
-    let params: Vec<&tree::Param> = file
-        .statements
-        .iter()
-        .filter_map(|statement| match &statement.kind {
-            StatementKind::Param(param) => Some(param),
-            _ => None,
-        })
-        .collect();
-    let mut overrides = Vec::new();
-    for (name, value) in &settings.set {
-        let text = format!("lamella 1\nlet {name} = {value}\n");
-        let id = sources.add(format!("--set {name}={value}"), text.clone());
-        let place = Span::new(id, "lamella 1\nlet ".len(), text.len() - 1);
-        let Some(param) = params.iter().find(|param| param.name.value == *name) else {
-            diagnostics.push(unknown_parameter(name, place, &params, constant(file, name)));
-            continue;
-        };
-        let (parsed, errors) = crate::syntax::parse(id, &text);
-        let value = parsed.statements.into_iter().find_map(|statement| match statement.kind {
-            StatementKind::Let(statement) => Some(statement.value),
-            _ => None,
-        });
-        diagnostics.extend(errors);
-        if let Some(value) = value {
-            overrides.push(tree::Param { value, ..(*param).clone() });
-        }
-    }
-    overrides
-}
-
-/// The `let` statement of that name.
-fn constant<'a>(file: &'a tree::File, name: &str) -> Option<&'a tree::Let> {
-    file.statements.iter().find_map(|statement| match &statement.kind {
-        StatementKind::Let(constant) if constant.name.value == name => Some(constant),
-        _ => None,
-    })
-}
-
-fn unknown_parameter(
-    name: &str,
-    place: Span,
-    params: &[&tree::Param],
-    constant: Option<&tree::Let>,
-) -> Diagnostic {
-    let names: Vec<&str> = params.iter().map(|param| param.name.value.as_str()).collect();
-    let mut message = Diagnostic::error(P001, format!("the scene has no parameter `{name}`"))
-        .at(place, "set on the command line")
-        .found(format!("`{name}`"))
-        .expected(if names.is_empty() {
-            "no setting: the scene has no `param`".into()
-        } else {
-            names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
-        });
-    if let Some(constant) = constant {
-        message = message
-            .also(constant.name.span, "a constant, which is fixed")
-            .help("write it as `param` instead of `let`, and it can be set");
-    } else if let Some(candidate) = did_you_mean(name, names.iter().copied()) {
-        message = message.help(format!("did you mean `{candidate}`?"));
-    }
-    message
 }

@@ -16,6 +16,7 @@ mod quantity;
 mod reactions;
 mod reference;
 mod scope;
+mod settings;
 mod slot;
 mod zones;
 
@@ -41,6 +42,8 @@ pub struct Settings {
 pub struct Scenario {
     pub title: Option<String>,
     pub citations: Vec<String>,
+    /// `--set name=value`, in order.
+    pub settings: Vec<(String, String)>,
     pub parameters: Vec<Parameter>,
     pub species: Vec<Species>,
     pub reactions: Vec<Reaction>,
@@ -64,8 +67,13 @@ pub struct Scenario {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameter {
     pub name: String,
+    /// In SI.
     pub value: f64,
     pub dimension: Dimension,
+    /// The unit as it was written; absent for a value that is worked out.
+    pub unit: Option<String>,
+    /// Whether the command line set it.
+    pub is_set: bool,
     pub doc: Option<String>,
     pub span: Span,
 }

@@ -1,6 +1,6 @@
 //! Species, reactions, mixing zones, particles and the run itself.
 
-use super::check::{Allow, Checker};
+use super::check::{Allow, Checker, label_circle};
 use super::collect::Statements;
 use super::expression::{Expr, Type};
 use super::scope::Origin;
@@ -46,8 +46,9 @@ pub(super) fn species<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>
     }
     let assigned = assignments(checker, statements);
     let mut initials: Vec<Initial> = vec![Initial::Untouched; statements.species.len()];
+    let mut running = Vec::new();
     for idx in 0..initials.len() {
-        initial_of(checker, statements, &assigned, &mut initials, idx);
+        initial_of(checker, &assigned, &mut initials, &mut running, idx);
     }
     spread_dimensions(checker, statements);
     let list = statements.species.iter().enumerate().map(|(idx, written)| {
@@ -124,27 +125,29 @@ pub(super) fn species_index(checker: &mut Checker<'_>, name: &tree::Name) -> Opt
     None
 }
 
+/// Works the initial concentration of a species out, after those that it needs; `running` are the
+/// species on the way to it.
 fn initial_of<'a>(
     checker: &mut Checker<'a>,
-    statements: &Statements<'a>,
     assigned: &[Option<&'a tree::Assignment>],
     initials: &mut [Initial],
+    running: &mut Vec<usize>,
     idx: usize,
 ) {
     match initials[idx] {
         Initial::Untouched => {}
         Initial::Running => {
-            let name = &statements.species[idx].name;
-            let place = assigned[idx].map_or(name.span, |assignment| assignment.name.span);
-            checker.report(
-                Diagnostic::error(
-                    D006,
-                    format!("the initial concentration of `{}` needs itself", name.value),
-                )
-                .at(place, "in a circle of definitions")
-                .found("a circle")
-                .expected("initial concentrations that end in numbers"),
-            );
+            let first = running.iter().position(|&other| other == idx).unwrap_or(0);
+            let link = |&other: &usize| assigned[other].map(|a| (a.name.value.as_str(), a.name.span));
+            let links: Vec<(&str, Span)> = running[first..].iter().filter_map(link).collect();
+            if let Some((name, _)) = links.first() {
+                let message =
+                    Diagnostic::error(D006, format!("the initial concentration of `{name}` needs itself"));
+                let message = label_circle(message, &links, "needs the initial concentration of")
+                    .found("a circle")
+                    .expected("initial concentrations that end in numbers");
+                checker.report(message);
+            }
             initials[idx] = Initial::Wrong;
             return;
         }
@@ -155,13 +158,15 @@ fn initial_of<'a>(
         return;
     };
     initials[idx] = Initial::Running;
+    running.push(idx);
     let mut names = Vec::new();
     collect_names(&assignment.value, &mut names);
     for name in names {
         if let Some(Origin::Species(other)) = checker.scope.get(&name).map(|entry| entry.origin) {
-            initial_of(checker, statements, assigned, initials, other);
+            initial_of(checker, assigned, initials, running, other);
         }
     }
+    running.pop();
     if matches!(initials[idx], Initial::Wrong) {
         return;
     }

@@ -51,6 +51,16 @@ pub(super) struct Entry<'a> {
     pub n_uses: usize,
 }
 
+impl Entry<'_> {
+    /// Where the value was set: a setting of the command line has a text of its own.
+    pub(super) fn place_of_value(&self) -> Span {
+        match self.origin {
+            Origin::Param(statement) if statement.value.span.file != self.span.file => statement.value.span,
+            _ => self.span,
+        }
+    }
+}
+
 /// All names of a scene.
 #[derive(Debug, Default)]
 pub(super) struct Scope<'a> {

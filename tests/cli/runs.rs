@@ -235,3 +235,41 @@ fn an_old_figure_does_not_stay_beside_new_tables() {
     run(&folder, &["--seed", "7"]).exits(0);
     assert!(!folder.files().contains(&"results/small/figure.svg".to_owned()));
 }
+
+#[test]
+fn settings_stand_in_the_results() {
+    let folder = with_small();
+    let set = ["--set", "D = 26 cm^2/h", "--set", "c0=2 * 5 mol/m^3", "--set", "c0=10 mol/m^3"];
+    run(&folder, &[&["--out", "set", "-q"], &set[..]].concat()).exits(0);
+    let edited = SMALL.replace("1.3e-3 cm^2/s", "26 cm^2/h").replace("0.02 mol/L", "10 mol/m^3");
+    folder.write("edited.lam", edited);
+    folder.lamella(&["run", "edited.lam", "--out", "edited", "-q"]).exits(0);
+    let document = |out: &str| -> serde_yaml::Value {
+        serde_yaml::from_str(&folder.read(&format!("{out}/plan.yaml"))).expect("a document")
+    };
+    let (set, edited) = (document("set"), document("edited"));
+    // What is recorded is no part of the plan.
+    assert_eq!(set["plan_hash"], edited["plan_hash"]);
+    let wanted =
+        "[{name: D, value: 26 cm^2/h}, {name: c0, value: 2 * 5 mol/m^3}, {name: c0, value: 10 mol/m^3}]";
+    assert_eq!(set["settings"], serde_yaml::from_str::<serde_yaml::Value>(wanted).expect("YAML"));
+    assert_eq!(edited["settings"].as_sequence().map(Vec::len), Some(0));
+    let parameter = |name: &str, value: f64, unit: &str, si_unit: &str, is_set: bool| {
+        let text =
+            format!("{{name: {name}, value: {value:?}, si_unit: {si_unit}, unit: {unit}, is_set: {is_set}}}");
+        serde_yaml::from_str::<serde_yaml::Value>(&text).expect("YAML")
+    };
+    let d = 26e-4 / 3600.0;
+    assert_eq!(set["parameters"][0], parameter("c0", 10.0, "mol/m^3", "mol/m^3", true));
+    assert_eq!(set["parameters"][1], parameter("D", d, "cm^2/h", "m^2/s", true));
+    assert_eq!(edited["parameters"][1], parameter("D", d, "cm^2/h", "m^2/s", false));
+    let points = |out: &str| {
+        let path = folder.path(&format!("{out}/points.parquet"));
+        lamella::table::read::points(&path).expect("points").remove(0).values
+    };
+    let column = |out: &str, name: &str| {
+        points(out).iter().find(|value| value.name == name).and_then(|value| value.value)
+    };
+    assert_eq!((column("set", "D"), column("set", "c0")), (Some(d), Some(10.0)));
+    assert_eq!((column("edited", "D"), column("edited", "c0")), (None, None));
+}

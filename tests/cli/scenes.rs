@@ -110,6 +110,18 @@ fn settings_are_checked_like_the_scene() {
 }
 
 #[test]
+fn messages_about_settings_show_them_as_typed() {
+    let folder = with_template("gramling");
+    let plan = |setting: &str| folder.lamella(&["plan", "scene.lam", "--set", setting]).exits(2);
+    plan("v = 2 kg").says("--set:1:5").says("v = 2 kg");
+    plan("w=2").says("--set:1:1").says("w=2");
+    plan("v=v").says("error[D006]").says("--set:1:3").says("v=v");
+    plan("v=2 cm/s +").says("--set:1:").says("v=2 cm/s +");
+    // A second line would never be read.
+    plan("v=2 cm/s\nseed 7").says("error[S001]").says("--set:1:9");
+}
+
+#[test]
 fn the_plan_hash_ignores_layout_and_units_and_sees_physics() {
     let folder = with_template("gramling");
     let scene = folder.read("scene.lam");

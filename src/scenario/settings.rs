@@ -1,0 +1,114 @@
+//! Settings of the command line: parameters with other values than the scene gives them.
+//!
+//! Owns `--set name=value` from its text to the parameter it replaces. May use `syntax`. It deliberately
+//! leaves ranges to the parameters themselves.
+
+use super::Settings;
+use super::check::{Allow, Checker};
+use super::expression::Type;
+use super::scope::Origin;
+use crate::diagnostic::codes::{P001, U104};
+use crate::diagnostic::{Diagnostic, did_you_mean};
+use crate::source::{Sources, Span};
+use crate::syntax::tree::{self, ExprKind, StatementKind, UnaryOperator};
+
+/// `--set name=value`: each is a parameter with a source of its own, `name=value` as it was typed.
+pub(super) fn read_settings(
+    file: &tree::File,
+    sources: &mut Sources,
+    settings: &Settings,
+    diagnostics: &mut Vec<Diagnostic>,
+) -> Vec<tree::Param> {
+    let params: Vec<&tree::Param> = file
+        .statements
+        .iter()
+        .filter_map(|statement| match &statement.kind {
+            StatementKind::Param(param) => Some(param),
+            _ => None,
+        })
+        .collect();
+    let mut overrides = Vec::new();
+    for (name, value) in &settings.set {
+        let text = format!("{name}={value}");
+        let id = sources.add("--set", text.clone());
+        let name = name.trim();
+        let Some(param) = params.iter().find(|param| param.name.value == name) else {
+            let start = text.len() - text.trim_start().len();
+            let place = Span::new(id, start, start + name.len());
+            diagnostics.push(unknown_parameter(name, place, &params, constant(file, name)));
+            continue;
+        };
+        let (value, errors) = crate::syntax::parse_setting(id, &text);
+        diagnostics.extend(errors);
+        if let Some(value) = value {
+            overrides.push(tree::Param { value, ..(*param).clone() });
+        }
+    }
+    overrides
+}
+
+/// The `let` statement of that name.
+fn constant<'a>(file: &'a tree::File, name: &str) -> Option<&'a tree::Let> {
+    file.statements.iter().find_map(|statement| match &statement.kind {
+        StatementKind::Let(constant) if constant.name.value == name => Some(constant),
+        _ => None,
+    })
+}
+
+fn unknown_parameter(
+    name: &str,
+    place: Span,
+    params: &[&tree::Param],
+    constant: Option<&tree::Let>,
+) -> Diagnostic {
+    let names: Vec<&str> = params.iter().map(|param| param.name.value.as_str()).collect();
+    let mut message = Diagnostic::error(P001, format!("the scene has no parameter `{name}`"))
+        .at(place, "set on the command line")
+        .found(format!("`{name}`"))
+        .expected(if names.is_empty() {
+            "no setting: the scene has no `param`".into()
+        } else {
+            names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
+        });
+    if let Some(constant) = constant {
+        message = message
+            .also(constant.name.span, "a constant, which is fixed")
+            .help("write it as `param` instead of `let`, and it can be set");
+    } else if let Some(candidate) = did_you_mean(name, names.iter().copied()) {
+        message = message.help(format!("did you mean `{candidate}`?"));
+    }
+    message
+}
+
+/// A setting of the command line keeps the dimension that the scene gives its parameter.
+pub(super) fn check_setting<'a>(checker: &mut Checker<'a>, written: &'a tree::Param, kind: Option<Type>) {
+    let set = match checker.scope.get(&written.name.value).map(|entry| entry.origin) {
+        Some(Origin::Param(set)) if !std::ptr::eq(set, written) => set,
+        _ => return,
+    };
+    let own = checker.check(&written.value, Allow::CONSTANT);
+    let (Some(own), Some(kind)) = (own, kind) else { return };
+    if own.kind.unify(kind).is_none() {
+        checker.report(
+            Diagnostic::error(
+                U104,
+                format!("`{}` is set to a value of another dimension", written.name.value),
+            )
+            .at(set.value.span, format!("this is {}", kind.describe()))
+            .also(written.value.span, format!("this is {}", own.kind.describe()))
+            .found(kind.describe())
+            .expected(own.kind.describe()),
+        );
+    }
+}
+
+/// The unit of a value that is a number with a unit; nothing else has one.
+pub(super) fn unit_as_written(value: &tree::Expr) -> Option<String> {
+    match &value.kind {
+        ExprKind::Number(number) => number.unit.as_ref().map(|unit| unit.value.clone()),
+        ExprKind::Unary { operator, operand } if operator.value == UnaryOperator::Negate => {
+            unit_as_written(operand)
+        }
+        _ => None,
+    }
+}
