@@ -39,21 +39,40 @@ impl pulp::NullaryFnOnce for Chunk<'_> {
     #[inline(always)]
     fn call(self) {
         let Self { x, w, bytes, words, normals, means, sums } = self;
+        let bytes = &bytes[..x.len()];
         for idx in 0..bytes.len() {
             words[idx] = u32::from_le_bytes(bytes[idx]);
         }
         normal::single(words, normals);
-        let scale = means.len() as f64;
-        for idx in 0..x.len() {
-            let mean = means[((x[idx] * scale) as i32 as usize).min(means.len() - 1)];
+        let (n, scale, last) = (x.len(), means.len() as f64, (means.len() - 1) as f64);
+        let mut bins = [0_i32; CHUNK];
+        locate(x, scale, last, &mut bins);
+        for idx in 0..n {
+            let mean = means[bins[idx] as usize];
             w[idx] = mean + (w[idx] - mean) * 0.999;
+        }
+        for idx in 0..n {
             let moved = (x[idx] + 3e-4 * normals[idx]).abs();
             x[idx] = if moved > 1.0 { 2.0 - moved } else { moved };
-            let bin = ((x[idx] * scale) as i32 as usize).min(means.len() - 1);
-            let sum = &mut sums[bin * LANES + idx % LANES];
+        }
+        locate(x, scale, last, &mut bins);
+        for idx in 0..n {
+            let sum = &mut sums[bins[idx] as usize * LANES + idx % LANES];
             sum[0] += 1.0;
             sum[1] += w[idx];
         }
+    }
+}
+
+/// Bins of positions between 0 and 1: the fastest way to whole numbers, which suits few bins only.
+#[inline(always)]
+fn locate(x: &[f64], scale: f64, last: f64, bins: &mut [i32; CHUNK]) {
+    const SHIFT: f64 = 4_503_599_627_370_496.0;
+    for idx in 0..x.len() {
+        let along = x[idx] * scale - 0.5;
+        let along = if along < last { along } else { last };
+        let along = if along > 0.0 { along } else { 0.0 };
+        bins[idx] = (along + SHIFT).to_bits() as i32;
     }
 }
 

@@ -2,13 +2,16 @@
 //!
 //! Owns the exact exponential step. May use `state` and the means. It deliberately computes no means.
 
+#![allow(clippy::needless_range_loop)] // Zipped iterators are not always inlined; these loops are hot.
+
 use super::average::Means;
 use super::program::{Program, Role};
 use crate::state::particles::CHUNK;
 use std::ops::Range;
 
 /// Relaxes a chunk towards the means of its bins; the last component with a value below its limit is
-/// returned.
+/// returned. The means that the particles saw are left in `targets`: one per component, or a single one
+/// that is used again and again.
 ///
 /// - Equation: `W ← W̄ + (W − W̄) e^{−χΔt/2}`.
 /// - Symbols: `W̄` mean of this zone in the bin, `χ` rate, `decays` the exponential per slot.
@@ -22,13 +25,15 @@ pub fn relax<const D: usize>(
     decays: &[Option<f64>],
     slots: &[i32],
     columns: &mut [&mut [f64]],
-    target: &mut [f64; CHUNK],
+    targets: &mut [[f64; CHUNK]],
     limits: &[f64],
 ) -> Option<usize> {
     let mut below = None;
     let n_slots = program.roles.len();
     for (column_idx, column) in columns.iter_mut().enumerate() {
         let (component, slot) = (column_idx / n_slots, column_idx % n_slots);
+        let last = targets.len() - 1;
+        let target = &mut targets[component.min(last)];
         match (program.roles[slot], decays[slot]) {
             (Role::Relaxing(_), Some(decay)) => {
                 gather(program, &means.columns[column_idx], slots, column, target);
@@ -56,13 +61,17 @@ pub fn gather<const D: usize>(
     target: &mut [f64; CHUNK],
 ) {
     let n_bins = program.grid.n_bins() as i32;
+    let n = slots.len();
+    let target = &mut target[..n];
     if program.grid.has_open_side() {
-        for ((target, &slot), &own) in target.iter_mut().zip(slots).zip(own) {
-            *target = if slot < n_bins { means[slot as usize] } else { own };
+        let own = &own[..n];
+        for idx in 0..n {
+            let slot = slots[idx];
+            target[idx] = if slot < n_bins { means[slot as usize] } else { own[idx] };
         }
     } else {
-        for (target, &slot) in target.iter_mut().zip(slots) {
-            *target = means[slot as usize];
+        for idx in 0..n {
+            target[idx] = means[slots[idx] as usize];
         }
     }
 }
@@ -71,9 +80,10 @@ pub fn gather<const D: usize>(
 #[inline(always)]
 fn approach(values: &mut [f64], target: &[f64; CHUNK], decay: f64, limit: f64) -> bool {
     let mut n_below = 0_u64;
-    for (value, &target) in values.iter_mut().zip(target) {
-        *value = target + (*value - target) * decay;
-        n_below |= u64::from(*value < limit);
+    let target = &target[..values.len()];
+    for idx in 0..values.len() {
+        values[idx] = target[idx] + (values[idx] - target[idx]) * decay;
+        n_below |= u64::from(values[idx] < limit);
     }
     n_below != 0
 }

@@ -81,7 +81,7 @@ impl<const D: usize> pulp::NullaryFnOnce for OnBlock<'_, D> {
             if pass.work.mixes {
                 program.grid.locate(positions.each_ref().map(|axis| &**axis), slots);
                 let mut chunk = mix::cut(&mut columns, range.clone());
-                let target = &mut scratch.target;
+                let target = std::slice::from_mut(&mut scratch.target);
                 let below =
                     mix::relax(program, pass.means, pass.decays, slots, &mut chunk, target, pass.limits);
                 if let Some(component) = below {

@@ -7,6 +7,7 @@ mod front;
 mod limits;
 mod mixing;
 mod moments;
+mod standard_errors;
 #[path = "../support/mod.rs"]
 mod support;
 mod uniform;

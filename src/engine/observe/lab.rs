@@ -3,13 +3,15 @@
 //! Owns the view of a state that is not disturbed by being looked at. May use the stages and `state`.
 //! It deliberately writes to no particle.
 
+#![allow(clippy::needless_range_loop)] // Zipped iterators are not always inlined; these loops are hot.
+
 use super::super::average::Means;
 use super::super::mix;
-use super::super::program::{Program, Term};
+use super::super::program::{Program, Role, Term};
 use super::super::run::Run;
 use super::super::step::Scratch;
 use super::super::walk::{Leap, Noise, Place};
-use super::chemistry::{Needs, speciate};
+use super::chemistry::{self, Needs};
 use crate::state::particles::{Block, CHUNK};
 use std::ops::Range;
 
@@ -66,11 +68,15 @@ pub struct Lab<const D: usize> {
     pub simulated: Vec<[f64; CHUNK]>,
     /// Per component ū as the particle sees it.
     pub mixed: Vec<[f64; CHUNK]>,
+    /// Whether `mixed` holds the means of this instant already.
+    is_mixed_known: bool,
     /// Per component U.
     pub components: Vec<[f64; CHUNK]>,
     /// Per species, as if nothing had reacted, and as it is.
     pub unreacted: Vec<[f64; CHUNK]>,
     pub species: Vec<[f64; CHUNK]>,
+    /// Per species and component the slope of the reacted concentration by U.
+    pub slopes: Vec<[f64; CHUNK]>,
     scratch: Box<Scratch<D>>,
     bridge_noise: Noise<D>,
 }
@@ -86,18 +92,22 @@ impl<const D: usize> Lab<D> {
             columns: vec![vec![0.0; CHUNK]; program.n_columns()],
             simulated: zeros(program.n_components()),
             mixed: zeros(program.n_components()),
+            is_mixed_known: false,
             components: zeros(program.n_components()),
             unreacted: zeros(n_species),
             species: zeros(n_species),
+            slopes: zeros(n_species * program.n_components()),
             scratch: Scratch::new(),
             bridge_noise: [[0.0; CHUNK]; D],
         })
     }
 
+    #[inline(always)]
     pub fn positions(&self) -> [&[f64]; D] {
         self.positions.each_ref().map(|axis| &axis[..self.n])
     }
 
+    #[inline(always)]
     pub fn slots(&self) -> &[i32] {
         &self.slots[..self.n]
     }
@@ -105,137 +115,119 @@ impl<const D: usize> Lab<D> {
 
 /// Fills a lab with one chunk: positions, bins and carried values at the instant, before any mixing
 /// within the step that the instant lies in.
-pub struct Load<'a, const D: usize> {
-    pub run: &'a Run<'a, D>,
-    pub instant: &'a Instant<D>,
-    pub block: &'a Block<D>,
-    pub range: Range<usize>,
-    pub lab: &'a mut Lab<D>,
-}
-
-impl<const D: usize> pulp::NullaryFnOnce for Load<'_, D> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let Self { run, instant, block, range, lab } = self;
-        let program = &run.program;
-        let n = range.len();
-        lab.n = n;
-        for (target, source) in lab.positions.iter_mut().zip(&block.positions) {
-            target[..n].copy_from_slice(&source[range.clone()]);
+#[inline(always)]
+pub fn load<const D: usize>(
+    run: &Run<D>,
+    instant: &Instant<D>,
+    block: &Block<D>,
+    range: Range<usize>,
+    lab: &mut Lab<D>,
+) {
+    let program = &run.program;
+    let n = range.len();
+    lab.n = n;
+    for axis in 0..D {
+        lab.positions[axis][..n].copy_from_slice(&block.positions[axis][range.clone()]);
+    }
+    for (target, source) in lab.columns.iter_mut().zip(&block.columns) {
+        target.resize(n, 0.0);
+        target.copy_from_slice(&source[range.clone()]);
+    }
+    let mut positions = lab.positions.each_mut().map(|axis| &mut axis[..n]);
+    let slots = &mut lab.slots[..n];
+    program.grid.locate(positions.each_ref().map(|axis| &**axis), slots);
+    lab.is_mixed_known = false;
+    if let Some(decays) = &run.pending {
+        let mut columns = mix::cut(&mut lab.columns, 0..n);
+        // A value out of range is reported by the step itself.
+        mix::relax(program, &run.means, decays, slots, &mut columns, &mut lab.mixed, &run.limits);
+        lab.is_mixed_known = sees_mean(program);
+    }
+    if let Instant::Between(between) = instant {
+        let chunk_idx = (range.start / CHUNK) as u64;
+        let place = Place { block_idx: block.idx, chunk_idx, step: between.step };
+        program.mover.draw(run.width, &run.walk, place, &mut lab.scratch.noise);
+        let place = Place { step: between.bridge, ..place };
+        program.mover.draw(run.width, &run.bridge, place, &mut lab.bridge_noise);
+        between.along.apply(&mut positions, &lab.scratch.noise);
+        between.across.apply(&mut positions, &lab.bridge_noise);
+        for (rule, positions) in program.rules.iter().zip(&mut positions) {
+            // A position that is not finite stops the step itself.
+            let _ = rule.apply(positions);
         }
-        for (target, source) in lab.columns.iter_mut().zip(&block.columns) {
-            target.resize(n, 0.0);
-            target.copy_from_slice(&source[range.clone()]);
-        }
-        let mut positions = lab.positions.each_mut().map(|axis| &mut axis[..n]);
-        let slots = &mut lab.slots[..n];
         program.grid.locate(positions.each_ref().map(|axis| &**axis), slots);
-        if let Some(decays) = &run.pending {
-            let mut columns = mix::cut(&mut lab.columns, 0..n);
-            // A value out of range is reported by the step itself.
-            mix::relax(
-                program,
-                &run.means,
-                decays,
-                slots,
-                &mut columns,
-                &mut lab.scratch.target,
-                &run.limits,
-            );
-        }
-        if let Instant::Between(between) = instant {
-            let chunk_idx = (range.start / CHUNK) as u64;
-            let place = Place { block_idx: block.idx, chunk_idx, step: between.step };
-            program.mover.draw(run.width, &run.walk, place, &mut lab.scratch.noise);
-            let place = Place { step: between.bridge, ..place };
-            program.mover.draw(run.width, &run.bridge, place, &mut lab.bridge_noise);
-            between.along.apply(&mut positions, &lab.scratch.noise);
-            between.across.apply(&mut positions, &lab.bridge_noise);
-            for (rule, positions) in program.rules.iter().zip(&mut positions) {
-                // A position that is not finite stops the step itself.
-                let _ = rule.apply(positions);
-            }
-            program.grid.locate(positions.each_ref().map(|axis| &**axis), slots);
-        }
+        lab.is_mixed_known = false;
     }
 }
 
-/// From carried values to concentrations, once the means of the instant are known.
-pub struct Resolve<'a, const D: usize> {
-    pub program: &'a Program<'a, D>,
-    pub instant: &'a Instant<D>,
-    pub means: &'a Means,
-    pub limits: &'a [f64],
-    pub needs: &'a Needs,
-    pub lab: &'a mut Lab<D>,
+/// Whether the mean that a relaxation leaves behind is ū: with one simulated zone it is.
+#[inline(always)]
+fn sees_mean<const D: usize>(program: &Program<D>) -> bool {
+    matches!(program.roles[..], [Role::Relaxing(_)])
 }
 
-impl<const D: usize> pulp::NullaryFnOnce for Resolve<'_, D> {
-    type Output = ();
-
-    #[inline(always)]
-    fn call(self) {
-        let Self { program, instant, means, limits, needs, lab } = self;
-        let n = lab.n;
-        if let Instant::Between(between) = instant {
-            let mut columns = mix::cut(&mut lab.columns, 0..n);
-            // A value out of range is reported by the step itself.
-            mix::relax(
-                program,
-                means,
-                &between.decays,
-                &lab.slots[..n],
-                &mut columns,
-                &mut lab.scratch.target,
-                limits,
-            );
+/// From carried values to concentrations, once the means of the instant are known.
+#[inline(always)]
+pub fn resolve<const D: usize>(
+    program: &Program<D>,
+    instant: &Instant<D>,
+    means: &Means,
+    limits: &[f64],
+    needs: &Needs,
+    lab: &mut Lab<D>,
+) {
+    let n = lab.n;
+    if let Instant::Between(between) = instant {
+        let (slots, mut columns) = (&lab.slots[..n], mix::cut(&mut lab.columns, 0..n));
+        // A value out of range is reported by the step itself.
+        mix::relax(program, means, &between.decays, slots, &mut columns, &mut lab.mixed, limits);
+        lab.is_mixed_known = sees_mean(program);
+    }
+    let n_slots = program.roles.len();
+    for component in 0..program.n_components() {
+        let columns = &lab.columns[component * n_slots..][..n_slots];
+        if needs.simulated {
+            weighted(&program.mean_weights, columns, &mut lab.simulated[component][..n]);
         }
-        let n_slots = program.roles.len();
-        for component in 0..program.n_components() {
-            let columns = &lab.columns[component * n_slots..][..n_slots];
-            weighted(&program.mean_weights, columns, &mut lab.simulated[component]);
-            if !needs.any() {
-                continue;
-            }
-            if program.terms.iter().any(|term| matches!(term, Term::Mean { .. })) {
-                let own = &lab.simulated[component][..n];
-                mix::gather(
-                    program,
-                    &means.mixed[component],
-                    &lab.slots[..n],
-                    own,
-                    &mut lab.mixed[component],
-                );
-            }
-            let (mixed, target) = (&lab.mixed[component], &mut lab.components[component]);
-            total(&program.terms, columns, mixed, &mut target[..n]);
+        if needs.mixed && !lab.is_mixed_known {
+            let own = &lab.simulated[component][..n];
+            let target = &mut lab.mixed[component];
+            mix::gather(program, &means.mixed[component], &lab.slots[..n], own, target);
         }
-        speciate(program, needs, n, &lab.components, &mut lab.unreacted, &mut lab.species);
+        if needs.any() {
+            let (mixed, target) = (&lab.mixed[component][..n], &mut lab.components[component][..n]);
+            total(&program.terms, columns, mixed, target);
+        }
+    }
+    chemistry::speciate(program, needs, n, &lab.components, &mut lab.unreacted, &mut lab.species);
+    if needs.slopes {
+        chemistry::slopes(program, needs, n, &lab.unreacted, &mut lab.slopes);
     }
 }
 
 #[inline(always)]
-fn weighted(weights: &[(usize, f64)], columns: &[Vec<f64>], target: &mut [f64; CHUNK]) {
+fn weighted(weights: &[(usize, f64)], columns: &[Vec<f64>], target: &mut [f64]) {
     for (rank, &(slot, weight)) in weights.iter().enumerate() {
-        for (target, value) in target.iter_mut().zip(&columns[slot]) {
-            *target = if rank == 0 { weight * value } else { *target + weight * value };
+        let column = &columns[slot][..target.len()];
+        for idx in 0..target.len() {
+            let value = weight * column[idx];
+            target[idx] = if rank == 0 { value } else { target[idx] + value };
         }
     }
 }
 
 /// `U = Σ_i η_i W_i`, zones in order.
 #[inline(always)]
-fn total(terms: &[Term], columns: &[Vec<f64>], mixed: &[f64; CHUNK], target: &mut [f64]) {
-    target.fill(0.0);
-    for term in terms {
+fn total(terms: &[Term], columns: &[Vec<f64>], mixed: &[f64], target: &mut [f64]) {
+    let n = target.len();
+    for (rank, term) in terms.iter().enumerate() {
         let (fraction, values) = match *term {
-            Term::Column { slot, fraction } => (fraction, &columns[slot][..]),
-            Term::Mean { fraction } => (fraction, &mixed[..]),
+            Term::Column { slot, fraction } => (fraction, &columns[slot][..n]),
+            Term::Mean { fraction } => (fraction, &mixed[..n]),
         };
-        for (target, value) in target.iter_mut().zip(values) {
-            *target += fraction * value;
+        for idx in 0..n {
+            let before = if rank == 0 { 0.0 } else { target[idx] };
+            target[idx] = before + fraction * values[idx];
         }
     }
 }

@@ -3,6 +3,8 @@
 //! Owns their sums and the correction of their sampling bias. May use the lab and the means. It
 //! deliberately looks at unreacted concentrations only.
 
+#![allow(clippy::needless_range_loop)] // Zipped iterators are not always inlined; these loops are hot.
+
 use super::super::average::Means;
 use super::super::program::Program;
 use super::super::snapshot::MixingState;
@@ -78,6 +80,7 @@ impl<'a, const D: usize> Mixing<'a, D> {
     }
 
     /// Adds a chunk.
+    #[inline(always)]
     pub fn add(&self, lab: &Lab<D>, sums: &mut [f64]) {
         let mut own_slots = [0; CHUNK];
         let slots = match self.grid {
@@ -90,33 +93,53 @@ impl<'a, const D: usize> Mixing<'a, D> {
         for (&(k, l), sums) in self.products.iter().zip(sums.as_chunks_mut::<2>().0) {
             for start in (0..lab.n).step_by(PART) {
                 let range = start..(start + PART).min(lab.n);
-                let [weighted, biased] = self.products_of(k, l, &slots[range.clone()], lab, range);
+                let mut products = [0.0; PART];
+                self.multiply(k, l, slots, lab, range.clone(), &mut products);
+                let [weighted, biased] = self.weigh(&products, &slots[range]);
                 sums[0] += lane_sum(&weighted);
                 sums[1] += lane_sum(&biased);
             }
         }
     }
 
-    /// Products of two deviations, times both weights of their bin.
+    /// Products of two deviations from the bin's means. In the bins of the averages the lab has gathered
+    /// these means.
     #[inline(always)]
-    fn products_of(
+    fn multiply(
         &self,
         k: usize,
         l: usize,
         slots: &[i32],
         lab: &Lab<D>,
         range: Range<usize>,
-    ) -> [[f64; PART]; 2] {
+        products: &mut [f64; PART],
+    ) {
+        let n = range.len().min(PART);
+        let (a, b) = (&lab.simulated[k][range.clone()][..n], &lab.simulated[l][range.clone()][..n]);
+        if self.grid.is_none() {
+            let (mean_a, mean_b) = (&lab.mixed[k][range.clone()][..n], &lab.mixed[l][range][..n]);
+            for idx in 0..n {
+                products[idx] = (a[idx] - mean_a[idx]) * (b[idx] - mean_b[idx]);
+            }
+            return;
+        }
+        let (mean_a, mean_b) = (&self.means.mixed[k], &self.means.mixed[l]);
+        let slots = &slots[range][..n];
+        for idx in 0..n {
+            let slot = slots[idx] as usize;
+            products[idx] = (a[idx] - mean_a[slot]) * (b[idx] - mean_b[slot]);
+        }
+    }
+
+    /// Products times both weights of their bin.
+    #[inline(always)]
+    fn weigh(&self, products: &[f64; PART], slots: &[i32]) -> [[f64; PART]; 2] {
         let mut both = [[0.0; PART]; 2];
         let [weighted, biased] = &mut both;
-        let (a, b) = (&lab.simulated[k][range.clone()], &lab.simulated[l][range]);
-        let (mean_a, mean_b) = (&self.means.mixed[k], &self.means.mixed[l]);
-        for (idx, ((&slot, a), b)) in slots.iter().zip(a).zip(b).enumerate() {
-            let slot = slot as usize;
-            let product = (a - mean_a[slot]) * (b - mean_b[slot]);
-            let [weight, bias] = self.weights[slot];
-            weighted[idx] = product * weight;
-            biased[idx] = product * bias;
+        for idx in 0..slots.len().min(PART) {
+            let [weight, bias] = self.weights[slots[idx] as usize];
+            weighted[idx] = products[idx] * weight;
+            biased[idx] = products[idx] * bias;
         }
         both
     }

@@ -5,6 +5,7 @@
 
 mod chemistry;
 mod lab;
+mod look;
 mod mixing;
 mod tally;
 
@@ -17,13 +18,11 @@ use super::schedule::Due;
 use super::snapshot::{Snapshot, Values};
 use crate::plan::{Output, OutputKind, Quantity};
 use crate::state::grid::Grid;
-use crate::state::particles::{Block, CHUNK};
 use chemistry::Needs;
 pub use lab::{Instant, Lab};
-use lab::{Load, Resolve};
+use look::{Look, Sums};
 use mixing::Mixing;
 use std::borrow::Cow;
-use std::ops::Range;
 use tally::Tally;
 
 /// All snapshots of one due time, in the order of outputs.
@@ -53,7 +52,7 @@ pub fn observe<const D: usize>(
         });
         tallies.push(Tally::new(program, output, mixing).ok_or_else(bad_bins)?);
     }
-    let needs = Needs::of(program.plan, &due.outputs);
+    let needs = Needs::of(program, &due.outputs);
     let values = sum(run, instant, &means, &needs, &tallies);
     let snapshot = |(&output_idx, values)| Snapshot {
         output_idx,
@@ -122,22 +121,16 @@ fn sum_alike<const D: usize>(
     let first_at = offsets(tallies, |tally| tally.n_first());
     let second_at = offsets(tallies, |tally| tally.n_second());
     let (n_first, n_second) = (first_at[tallies.len()], second_at[tallies.len()]);
+    let resolved = Some((means, needs));
     let mut first = Vec::new();
     if n_first > 0 {
-        first = sweep(run, instant, Some((means, needs)), n_first, blocks_per_group, &|lab, sums| {
-            for (idx, tally) in tallies.iter().enumerate() {
-                tally.add_first(lab, &mut sums[first_at[idx]..first_at[idx + 1]]);
-            }
-        });
+        let sums = Sums::First { tallies, at: &first_at };
+        first = sweep(run, instant, resolved, n_first, blocks_per_group, sums);
     }
     let mut second = Vec::new();
     if n_second > 0 {
-        second = sweep(run, instant, Some((means, needs)), n_second, blocks_per_group, &|lab, sums| {
-            for (idx, tally) in tallies.iter().enumerate() {
-                let first = &first[first_at[idx]..first_at[idx + 1]];
-                tally.add_second(lab, first, &mut sums[second_at[idx]..second_at[idx + 1]]);
-            }
-        });
+        let sums = Sums::Second { tallies, first: &first, first_at: &first_at, at: &second_at };
+        second = sweep(run, instant, resolved, n_second, blocks_per_group, sums);
     }
     let values = tallies.iter().enumerate().map(|(idx, tally)| {
         let first = first.get(first_at[idx]..first_at[idx + 1]).unwrap_or_default();
@@ -161,11 +154,7 @@ fn average<const D: usize>(run: &Run<D>, instant: &Instant<D>, grid: &Grid<D>) -
     let stride = run.program.n_columns() + 1;
     let n_sums = grid.n_slots() * stride;
     let blocks_per_group = blocks_per_group(run.program.plan.particles.count, grid.n_slots());
-    let sums = sweep(run, instant, None, n_sums, blocks_per_group, &|lab, sums| {
-        let mut slots = [0; CHUNK];
-        grid.locate(lab.positions(), &mut slots[..lab.n]);
-        super::average::accumulate(&slots[..lab.n], &lab.columns, 0..lab.n, 1, sums);
-    });
+    let sums = sweep(run, instant, None, n_sums, blocks_per_group, Sums::Columns { grid });
     let mut means = Means::default();
     means.assign(&run.program, &sums);
     means
@@ -179,44 +168,29 @@ fn sweep<const D: usize>(
     resolved: Option<(&Means, &Needs)>,
     n_sums: usize,
     blocks_per_group: usize,
-    add: &(dyn Fn(&Lab<D>, &mut [f64]) + Sync),
+    sums: Sums<D>,
 ) -> Vec<f64> {
     let groups: Vec<_> = run.blocks.chunks(blocks_per_group).collect();
     let partial = parallel::map(groups.len(), &|group_idx| {
-        let mut sums = vec![0.0; n_sums];
+        let mut target = vec![0.0; n_sums];
         run.labs.lend(
             || Lab::new(&run.program),
             |lab| {
                 for block in groups[group_idx] {
                     for range in block.portions(instant.portion()) {
-                        load(run, instant, resolved, block, range, lab);
-                        add(lab, &mut sums);
+                        let target = &mut target[..];
+                        run.width.run(Look { run, instant, resolved, block, range, lab, sums, target });
                     }
                 }
             },
         );
-        sums
+        target
     });
     let mut merged = vec![0.0; n_sums];
     for group in partial {
         merged.iter_mut().zip(group).for_each(|(sum, part)| *sum += part);
     }
     merged
-}
-
-/// One chunk at the instant, with concentrations if means are given.
-fn load<const D: usize>(
-    run: &Run<D>,
-    instant: &Instant<D>,
-    resolved: Option<(&Means, &Needs)>,
-    block: &Block<D>,
-    range: Range<usize>,
-    lab: &mut Lab<D>,
-) {
-    run.width.run(Load { run, instant, block, range, lab });
-    if let Some((means, needs)) = resolved {
-        run.width.run(Resolve { program: &run.program, instant, means, limits: &run.limits, needs, lab });
-    }
 }
 
 /// Every particle, in order.
@@ -229,7 +203,9 @@ fn particles<const D: usize>(run: &Run<D>, instant: &Instant<D>, means: &Means, 
             || Lab::new(&run.program),
             |lab| {
                 for range in block.portions(instant.portion()) {
-                    load(run, instant, Some((means, needs)), block, range, lab);
+                    let resolved = Some((means, needs));
+                    let (sums, target) = (Sums::None, &mut [][..]);
+                    run.width.run(Look { run, instant, resolved, block, range, lab, sums, target });
                     let sources = lab.positions.iter().chain(&lab.species);
                     columns
                         .iter_mut()

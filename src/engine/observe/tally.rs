@@ -3,7 +3,9 @@
 //! Owns what is summed per particle and how sums become values, except for mixing. May use the lab.
 //! It deliberately holds no state: sums are arrays that the caller merges in order.
 
-use super::super::program::Program;
+#![allow(clippy::needless_range_loop)] // Zipped iterators are not always inlined; these loops are hot.
+
+use super::super::program::{Program, Term};
 use super::super::snapshot::Values;
 use super::lab::Lab;
 use super::mixing::Mixing;
@@ -18,11 +20,12 @@ const LANES: usize = 8;
 pub enum Tally<'a, const D: usize> {
     /// Profile and map.
     Binned {
-        grid: Grid<D>,
+        bins: Bins<D>,
         species: Vec<usize>,
+        follow: Follow,
     },
     Covariance {
-        grid: Grid<D>,
+        bins: Bins<D>,
         pairs: Vec<(usize, usize)>,
     },
     Total {
@@ -33,15 +36,60 @@ pub enum Tally<'a, const D: usize> {
     Particles,
 }
 
+/// The bins of an output.
+pub struct Bins<const D: usize> {
+    grid: Grid<D>,
+    /// Whether they are the bins of the averages, in which the lab has put the particles already.
+    is_shared: bool,
+}
+
+impl<const D: usize> Bins<D> {
+    fn new(program: &Program<D>, output: &Output) -> Option<Self> {
+        let grid = output_grid(program, output)?;
+        let is_shared = grid == program.grid;
+        Some(Self { grid, is_shared })
+    }
+
+    #[inline(always)]
+    fn slots<'s>(&self, lab: &'s Lab<D>, own: &'s mut [i32; CHUNK]) -> &'s [i32] {
+        if self.is_shared {
+            return lab.slots();
+        }
+        self.grid.locate(lab.positions(), &mut own[..lab.n]);
+        &own[..lab.n]
+    }
+}
+
+/// What standard errors need to know of the means that particles see.
+pub struct Follow {
+    /// `1 − f`: how much of U is ū; 0 if nothing sees it.
+    share: f64,
+    /// Components, or 0 if nothing sees ū.
+    n_components: usize,
+}
+
+impl Follow {
+    fn new<const D: usize>(program: &Program<D>) -> Self {
+        let fraction = |term: &Term| match *term {
+            Term::Mean { fraction } => fraction,
+            Term::Column { .. } => 0.0,
+        };
+        let share = program.terms.iter().map(fraction).sum();
+        let n_components = if share > 0.0 { program.n_components() } else { 0 };
+        Self { share, n_components }
+    }
+}
+
 impl<'a, const D: usize> Tally<'a, D> {
     /// `None` if the output's bins do not make a grid.
     pub fn new(program: &Program<D>, output: &Output, mixing: Option<Mixing<'a, D>>) -> Option<Self> {
         Some(match output.kind {
             OutputKind::Profile | OutputKind::Map => {
-                Self::Binned { grid: output_grid(program, output)?, species: species(output) }
+                let follow = Follow::new(program);
+                Self::Binned { bins: Bins::new(program, output)?, species: species(output), follow }
             }
             OutputKind::Covariance => {
-                Self::Covariance { grid: output_grid(program, output)?, pairs: pairs(output) }
+                Self::Covariance { bins: Bins::new(program, output)?, pairs: pairs(output) }
             }
             OutputKind::Total => Self::Total { species: species(output) },
             OutputKind::Mixing => Self::Mixing(mixing?),
@@ -52,7 +100,7 @@ impl<'a, const D: usize> Tally<'a, D> {
     /// Bins over which it sums: what decides how blocks are grouped.
     pub fn n_places(&self) -> usize {
         match self {
-            Self::Binned { grid, .. } | Self::Covariance { grid, .. } => grid.n_slots(),
+            Self::Binned { bins, .. } | Self::Covariance { bins, .. } => bins.grid.n_slots(),
             Self::Mixing(mixing) => mixing.n_slots(),
             Self::Total { .. } | Self::Particles => 1,
         }
@@ -61,8 +109,10 @@ impl<'a, const D: usize> Tally<'a, D> {
     /// Numbers that the first pass sums: for bins a count, then one number per column.
     pub fn n_first(&self) -> usize {
         match self {
-            Self::Binned { grid, species } => grid.n_slots() * (1 + species.len()),
-            Self::Covariance { grid, pairs } => grid.n_slots() * (1 + 2 * pairs.len()),
+            Self::Binned { bins, species, follow } => {
+                bins.grid.n_slots() * (1 + species.len() * (1 + follow.n_components))
+            }
+            Self::Covariance { bins, pairs } => bins.grid.n_slots() * (1 + 2 * pairs.len()),
             Self::Total { species } => species.len(),
             Self::Mixing(mixing) => mixing.n_sums(),
             Self::Particles => 0,
@@ -72,22 +122,24 @@ impl<'a, const D: usize> Tally<'a, D> {
     /// Numbers that the second pass sums: deviations from the means of the first.
     pub fn n_second(&self) -> usize {
         match self {
-            Self::Binned { grid, species } => grid.n_slots() * species.len(),
-            Self::Covariance { grid, pairs } => grid.n_slots() * pairs.len(),
+            Self::Binned { bins, species, .. } => bins.grid.n_slots() * species.len(),
+            Self::Covariance { bins, pairs } => bins.grid.n_slots() * pairs.len(),
             Self::Total { .. } | Self::Mixing(_) | Self::Particles => 0,
         }
     }
 
     /// Adds a chunk to the sums of the first pass.
+    #[inline(always)]
     pub fn add_first(&self, lab: &Lab<D>, sums: &mut [f64]) {
         match self {
-            Self::Binned { grid, species } => {
-                let columns: Vec<&[f64; CHUNK]> = species.iter().map(|&idx| &lab.species[idx]).collect();
-                add_binned(grid, lab, &columns, sums);
+            Self::Binned { bins, species, follow } => {
+                let own = species.iter().map(|&idx| &lab.species[idx]);
+                let slopes = species.iter().flat_map(|&idx| slopes_of(lab, idx, follow));
+                add_binned(bins, lab, &own.chain(slopes).collect::<Vec<_>>(), sums);
             }
-            Self::Covariance { grid, pairs } => {
+            Self::Covariance { bins, pairs } => {
                 let both = pairs.iter().flat_map(|&(a, b)| [&lab.unreacted[a], &lab.unreacted[b]]);
-                add_binned(grid, lab, &both.collect::<Vec<_>>(), sums);
+                add_binned(bins, lab, &both.collect::<Vec<_>>(), sums);
             }
             Self::Total { species } => {
                 for (sum, &idx) in sums.iter_mut().zip(species) {
@@ -100,21 +152,13 @@ impl<'a, const D: usize> Tally<'a, D> {
     }
 
     /// Adds a chunk to the sums of the second pass.
+    #[inline(always)]
     pub fn add_second(&self, lab: &Lab<D>, first: &[f64], sums: &mut [f64]) {
         match self {
-            Self::Binned { grid, species } => {
-                let columns = species.iter().enumerate().map(|(column, &idx)| {
-                    let (values, place) = (&lab.species[idx], 1 + column);
-                    (values, place, values, place)
-                });
-                add_deviations(grid, lab, columns, 1 + species.len(), first, sums);
+            Self::Binned { bins, species, follow } => {
+                add_influences(bins, lab, species, follow, first, sums);
             }
-            Self::Covariance { grid, pairs } => {
-                let columns = pairs.iter().enumerate().map(|(pair, &(a, b))| {
-                    (&lab.unreacted[a], 1 + 2 * pair, &lab.unreacted[b], 2 + 2 * pair)
-                });
-                add_deviations(grid, lab, columns, 1 + 2 * pairs.len(), first, sums);
-            }
+            Self::Covariance { bins, pairs } => add_products(bins, lab, pairs, first, sums),
             Self::Total { .. } | Self::Mixing(_) | Self::Particles => {}
         }
     }
@@ -122,8 +166,13 @@ impl<'a, const D: usize> Tally<'a, D> {
     /// The values of the output from both sums; `None` for particles.
     pub fn values(&self, program: &Program<D>, first: &[f64], second: &[f64]) -> Option<Values> {
         match self {
-            Self::Binned { grid, species } => Some(binned(grid.n_bins(), species.len(), first, second)),
-            Self::Covariance { grid, pairs } => Some(covariances(grid.n_bins(), pairs.len(), first, second)),
+            Self::Binned { bins, species, follow } => {
+                let stride = 1 + species.len() * (1 + follow.n_components);
+                Some(binned(bins.grid.n_bins(), species.len(), stride, first, second))
+            }
+            Self::Covariance { bins, pairs } => {
+                Some(covariances(bins.grid.n_bins(), pairs.len(), first, second))
+            }
             Self::Total { .. } => {
                 let volume = program.plan.particles.volume;
                 Some(Values::Total { amount: first.iter().map(|sum| volume * sum).collect() })
@@ -157,50 +206,101 @@ pub fn pairs(output: &Output) -> Vec<(usize, usize)> {
     output.quantities.iter().filter_map(only).collect()
 }
 
-fn add_binned<const D: usize>(grid: &Grid<D>, lab: &Lab<D>, columns: &[&[f64; CHUNK]], sums: &mut [f64]) {
-    let mut slots = [0; CHUNK];
-    grid.locate(lab.positions(), &mut slots[..lab.n]);
+/// Slopes of a species by each component, if anything follows the means.
+#[inline(always)]
+fn slopes_of<'l, const D: usize>(
+    lab: &'l Lab<D>,
+    species: usize,
+    follow: &Follow,
+) -> impl Iterator<Item = &'l [f64; CHUNK]> + use<'l, D> {
+    let n = follow.n_components;
+    lab.slopes[species * n..][..n].iter()
+}
+
+#[inline(always)]
+fn add_binned<const D: usize>(bins: &Bins<D>, lab: &Lab<D>, columns: &[&[f64; CHUNK]], sums: &mut [f64]) {
+    let mut own = [0; CHUNK];
+    let slots = bins.slots(lab, &mut own);
     let stride = columns.len() + 1;
-    for (idx, &slot) in slots[..lab.n].iter().enumerate() {
-        let target = &mut sums[slot as usize * stride..][..stride];
+    for idx in 0..slots.len() {
+        let target = &mut sums[slots[idx] as usize * stride..][..stride];
         target[0] += 1.0;
-        for (target, column) in target[1..].iter_mut().zip(columns) {
-            *target += column[idx];
+        for column in 0..columns.len() {
+            target[column + 1] += columns[column][idx];
         }
     }
 }
 
-/// Adds products of deviations; columns are `(a, place of a's sum, b, place of b's sum)`.
-fn add_deviations<'l, const D: usize>(
-    grid: &Grid<D>,
-    lab: &'l Lab<D>,
-    columns: impl Iterator<Item = (&'l [f64; CHUNK], usize, &'l [f64; CHUNK], usize)>,
-    stride: usize,
+/// Adds products of deviations of pairs.
+#[inline(always)]
+fn add_products<const D: usize>(
+    bins: &Bins<D>,
+    lab: &Lab<D>,
+    pairs: &[(usize, usize)],
     first: &[f64],
     sums: &mut [f64],
 ) {
-    let mut slots = [0; CHUNK];
-    grid.locate(lab.positions(), &mut slots[..lab.n]);
-    let columns: Vec<_> = columns.collect();
-    for (idx, &slot) in slots[..lab.n].iter().enumerate() {
-        let bin = &first[slot as usize * stride..][..stride];
-        let target = &mut sums[slot as usize * columns.len()..][..columns.len()];
-        for (target, &(a, place_a, b, place_b)) in target.iter_mut().zip(&columns) {
-            *target += (a[idx] - bin[place_a] / bin[0]) * (b[idx] - bin[place_b] / bin[0]);
+    let mut own = [0; CHUNK];
+    let slots = bins.slots(lab, &mut own);
+    let stride = 1 + 2 * pairs.len();
+    for idx in 0..slots.len() {
+        let slot = slots[idx] as usize;
+        let bin = &first[slot * stride..][..stride];
+        let target = &mut sums[slot * pairs.len()..][..pairs.len()];
+        for pair in 0..pairs.len() {
+            let (a, b) = (&lab.unreacted[pairs[pair].0], &lab.unreacted[pairs[pair].1]);
+            let mean = |place: usize| bin[place] / bin[0];
+            target[pair] += (a[idx] - mean(1 + 2 * pair)) * (b[idx] - mean(2 + 2 * pair));
+        }
+    }
+}
+
+/// Adds squares of what each particle does to the mean of its bin.
+///
+/// - Equation: `i = C − C̄ + (1 − f) Σ_k S̄_k (m_k − m̄_k)`.
+/// - Symbols: `S̄_k` the bin's mean of `∂C/∂U_k`, `m_k` the particle's value of component `k` in the
+///   simulated zones, `m̄_k` their mean, of which every particle of the bin sees the share `1 − f`.
+/// - Range: bins like those of the averages or coarser; in finer ones the second part is an upper bound.
+/// - Source: the influence function of a mean whose terms depend on another mean (the delta method).
+/// - Shape: per slot one sum per species.
+#[inline(always)]
+fn add_influences<const D: usize>(
+    bins: &Bins<D>,
+    lab: &Lab<D>,
+    species: &[usize],
+    follow: &Follow,
+    first: &[f64],
+    sums: &mut [f64],
+) {
+    let mut own = [0; CHUNK];
+    let slots = bins.slots(lab, &mut own);
+    let n_species = species.len();
+    let stride = 1 + n_species * (1 + follow.n_components);
+    for idx in 0..slots.len() {
+        let slot = slots[idx] as usize;
+        let bin = &first[slot * stride..][..stride];
+        let target = &mut sums[slot * n_species..][..n_species];
+        for column in 0..n_species {
+            let mut influence = lab.species[species[column]][idx] - bin[1 + column] / bin[0];
+            for k in 0..follow.n_components {
+                let slope = bin[1 + n_species + column * follow.n_components + k] / bin[0];
+                influence += follow.share * slope * (lab.simulated[k][idx] - lab.mixed[k][idx]);
+            }
+            target[column] += influence * influence;
         }
     }
 }
 
 /// Means and standard errors per bin.
 ///
-/// - Equation: `c̄ = Σc / n`, `s = (Σ(c − c̄)² / ((n − 1) n))^½`.
-/// - Symbols: `n` particles in the bin.
+/// - Equation: `c̄ = Σc / n`, `s = (Σi² / ((n − 1) n))^½`.
+/// - Symbols: `n` particles in the bin, `i` as in [`add_influences`]; without mixing zones `c − c̄`.
 /// - Range: no mean for `n = 0`, no standard error for `n < 2` (not a number).
 /// - Source: the textbook estimators.
 /// - Shape: a column over the bins per species.
-fn binned(n_bins: usize, n_columns: usize, first: &[f64], second: &[f64]) -> Values {
-    let count = |bin: usize| first[bin * (1 + n_columns)];
-    let mean = |bin: usize, column: usize| first[bin * (1 + n_columns) + 1 + column] / count(bin);
+fn binned(n_bins: usize, n_columns: usize, stride: usize, first: &[f64], second: &[f64]) -> Values {
+    let count = |bin: usize| first[bin * stride];
+    let mean = |bin: usize, column: usize| first[bin * stride + 1 + column] / count(bin);
     let error = |bin: usize, column: usize| {
         let n = count(bin);
         if n < 2.0 { f64::NAN } else { (second[bin * n_columns + column] / ((n - 1.0) * n)).sqrt() }
