@@ -208,3 +208,53 @@ fn limits_refuse_at_the_line_with_what_would_work() {
     );
     assert!(large.compiled.is_none() && large.diagnostics.iter().any(|d| d.code.0 == "N301"));
 }
+
+/// A front whose bins disperse, with one dispersion coefficient, number of bins and of particles.
+fn bins_scene(dispersion: &str, bins: &str, particles: &str) -> String {
+    format!(
+        "lamella 1
+species A
+domain line x = -1 m .. 1 m
+boundary left, right reflect
+dispersion {dispersion} m^2/s
+mixing zones {{
+  fast: fraction 0.5, rate instant
+  slow: fraction 0.5, rate 1e-4 /s
+}}
+average bins {bins}
+initial A = if x < 0 cm then 1 mol/L else 0
+particles fluid {particles} stratified
+run to 48 h, step 0.5 h
+output profile A at t = 24 h, 48 h
+"
+    )
+}
+
+#[test]
+fn the_help_about_bins_names_what_works() {
+    let messages = |text: &str| {
+        lamella::check(Sources::single("scene.lam", text), &Settings::default(), &Options::default())
+            .diagnostics
+    };
+    let help = |text: &str| {
+        let all = messages(text);
+        let message = all.iter().find(|d| ["N103", "N203"].contains(&d.code.0));
+        message.unwrap_or_else(|| panic!("{all:?}")).help[0].clone()
+    };
+    let after = |text: &str, mark: &str| {
+        let rest = text.split_once(mark).unwrap_or_else(|| panic!("`{mark}` in {text}")).1;
+        rest.split_whitespace().next().expect("a number").to_owned()
+    };
+    // More bins, which the particles of the scene fill.
+    let bins = after(&help(&bins_scene("1e-6", "20", "1e6")), "at least ");
+    assert_eq!(messages(&bins_scene("1e-6", &bins, "1e6")), []);
+    // More bins and more particles.
+    let both = help(&bins_scene("1e-10", "20", "1e5"));
+    let (bins, particles) = (after(&both, "at least "), after(&both, "and "));
+    assert_eq!(messages(&bins_scene("1e-10", &bins, &particles)), []);
+    // More bins than there can be: another coefficient, or another rate.
+    let none = help(&bins_scene("1e-24", "20", "1e5"));
+    assert!(none.contains("no number of bins"), "{none}");
+    assert_eq!(messages(&bins_scene(&after(&none, "coefficient of "), "20", "1e5")), []);
+    assert_eq!(messages(&bins_scene("1e-24", "20", "1e5").replace("rate 1e-4 /s", "rate instant")), []);
+}

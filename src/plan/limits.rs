@@ -6,10 +6,10 @@
 use super::cost::{self, Cost};
 use super::explain::number;
 use super::passes::Draft;
-use super::{Plan, ZoneRate};
+use super::{Plan, Side, ZoneRate};
 use crate::diagnostic::Diagnostic;
-use crate::diagnostic::codes::{N101, N102, N103, N104, N201, N202, N203, N301};
-use crate::scenario::Scenario;
+use crate::diagnostic::codes::{N101, N102, N103, N104, N105, N201, N202, N203, N301};
+use crate::scenario::{MAX_BINS, Scenario};
 use crate::source::Span;
 use serde::Serialize;
 
@@ -28,6 +28,8 @@ const TOO_FEW_PER_BIN: f64 = 2.0;
 /// χΔt above which splitting shows, and above which the covariance of a zone is lost in one step.
 const LARGE_EXCHANGE: f64 = 0.2;
 const TOO_LARGE_EXCHANGE: f64 = 2.0;
+/// Share of the domain that may run empty before it is said.
+const SMALL_EMPTY_SHARE: f64 = 0.01;
 /// Numerical dispersion of the bins against the physical one.
 const VISIBLE_DISPERSION: f64 = 0.02;
 
@@ -42,6 +44,7 @@ pub fn check(
     let mut limits = Vec::new();
     let mut diagnostics = Vec::new();
     travel(scenario, plan, &mut limits, &mut diagnostics);
+    emptying(scenario, plan, &mut diagnostics);
     if plan.mixing.is_some() {
         particles_per_bin(scenario, plan, &mut limits, &mut diagnostics);
         exchange(scenario, plan, &mut limits, &mut diagnostics);
@@ -103,6 +106,35 @@ fn travel(scenario: &Scenario, plan: &Plan, limits: &mut Vec<Limit>, diagnostics
                 .help("use a shorter step, or a `frame` that moves with the flow"),
             );
         }
+    }
+}
+
+/// An open side upstream lets nothing in: the flow carries the edge of the fluid into the domain.
+fn emptying(scenario: &Scenario, plan: &Plan, diagnostics: &mut Vec<Diagnostic>) {
+    for (axis, drift) in plan.axes.iter().zip(&plan.walk.drift) {
+        let upstream = if *drift > 0.0 { axis.low_side } else { axis.high_side };
+        let share = drift.abs() * plan.time.duration / (axis.high - axis.low);
+        let Some(written) = scenario.domain.axes.iter().find(|written| written.index == axis.index) else {
+            continue;
+        };
+        if upstream != Side::Open || share <= SMALL_EMPTY_SHARE {
+            continue;
+        }
+        let end = if share < 1.0 { plan.time.duration } else { plan.time.duration / share };
+        let percent = short(100.0 * share.min(1.0));
+        let place = if *drift > 0.0 { written.low_side_span } else { written.high_side_span };
+        let name = axis_name(axis.index);
+        diagnostics.push(
+            Diagnostic::warning(N105, format!("the flow along {name} empties the domain: nothing comes in"))
+                .at(place, format!("{percent} % of the domain is empty after {} s", short(end)))
+                .found(format!("an open side upstream, {} m/s across it", short(drift.abs())))
+                .expected(format!("at most {} % empty at the end", short(100.0 * SMALL_EMPTY_SHARE)))
+                .note("an open side lets particles out; inflow is not in this version")
+                .help(format!(
+                    "let the frame move with the flow (`frame moving v`), begin the domain {} m further upstream, or end the run earlier",
+                    short(drift.abs() * plan.time.duration)
+                )),
+        );
     }
 }
 
@@ -198,6 +230,15 @@ fn round_down(seconds: f64) -> String {
     format!("{} s", number(rounded))
 }
 
+/// Three figures, not below the given value.
+fn short_up(value: f64) -> String {
+    if value == 0.0 || !value.is_finite() {
+        return number(value);
+    }
+    let scale = 10f64.powi(value.abs().log10_floor() - 2);
+    number((value / scale * (1.0 - 1e-12)).ceil() * scale)
+}
+
 /// Three figures are enough for a message.
 fn short(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
@@ -262,7 +303,6 @@ fn numerical_dispersion(
         if ratio <= VISIBLE_DISPERSION {
             continue;
         }
-        let needed = (axis.bins as f64 * (ratio / VISIBLE_DISPERSION).sqrt()).ceil();
         let name = axis_name(axis.index);
         let message = if ratio > 1.0 {
             Diagnostic::refused(N203, format!("the bins along {name} disperse more than the scene does"))
@@ -274,8 +314,32 @@ fn numerical_dispersion(
                 .at(bins_span(scenario), format!("{} bins along {name}", axis.bins))
                 .found(format!("{} of the dispersion coefficient", short(ratio)))
                 .expected(format!("at most {VISIBLE_DISPERSION}"))
-                .help(format!("use at least {needed} bins along {name}")),
+                .help(enough_bins(plan, idx, ratio)),
         );
+    }
+}
+
+/// What brings the dispersion of the bins down to where it is not seen.
+fn enough_bins(plan: &Plan, axis_idx: usize, ratio: f64) -> String {
+    let axis = &plan.axes[axis_idx];
+    let name = axis_name(axis.index);
+    let factor = ratio / VISIBLE_DISPERSION;
+    let needed = (axis.bins as f64 * factor.sqrt()).ceil();
+    let others = n_bins(plan) / axis.bins as f64;
+    if needed * others > MAX_BINS {
+        let enough = short_up(dispersion(plan, axis_idx) * factor);
+        let larger = if factor.is_finite() {
+            format!(", or a dispersion coefficient of {enough} m^2/s or more along {name}")
+        } else {
+            ", or a shorter domain".to_owned()
+        };
+        return format!("no number of bins is enough: use `rate instant`, which adds none{larger}");
+    }
+    let particles = needed * others * FEW_PER_BIN;
+    if particles > plan.particles.count as f64 {
+        format!("use at least {needed} bins along {name}, and {particles} particles to fill them")
+    } else {
+        format!("use at least {needed} bins along {name}")
     }
 }
 

@@ -205,7 +205,7 @@ pub enum OutputKind {
     Covariance,
     /// Mean concentration per bin over all active axes.
     Map,
-    /// Amount in the domain: Σ volume · C.
+    /// Amount of all particles, those outside of open sides included: Σ volume · C.
     Total,
     /// M = ∫⟨C_a C_b⟩, M_mean = ∫ c̄_a c̄_b, M_cov, γ = M_cov / M_mean, of unreacted concentrations.
     Mixing,

@@ -6,7 +6,7 @@ use super::scope::{Origin, Progress, Scope};
 use super::settings::{check_setting, read_settings, unit_as_written};
 use super::{Parameter, Scenario, Settings};
 use crate::diagnostic::Diagnostic;
-use crate::diagnostic::codes::{D001, D010, M001, M002, P002};
+use crate::diagnostic::codes::{D001, D010, M001, M002, M018, P002};
 use crate::source::{Sources, Span};
 use crate::syntax::tree::{self, StatementKind};
 
@@ -273,6 +273,15 @@ fn report_missing<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>, fi
                     .help(format!("add for example `{example}`")),
             );
         }
+    }
+    if statements.outputs.is_empty() {
+        checker.report(
+            Diagnostic::warning(M018, "nothing is written: the scene has no output")
+                .at(place, "the scene ends here")
+                .found("no `output`")
+                .expected("one or more `output` statements")
+                .help("add for example `output profile A at t = 1 d on 100`"),
+        );
     }
 }
 

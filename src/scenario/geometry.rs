@@ -16,7 +16,7 @@ const SIDES: &[(&str, Side)] =
     &[("reflect", Side::Reflect), ("open", Side::Open), ("periodic", Side::Periodic)];
 
 /// Bins along one axis, and in all.
-const MAX_BINS: f64 = 1e8;
+pub const MAX_BINS: f64 = 1e8;
 
 /// The axes that the domain statement names, as far as they are axes.
 pub(super) fn axis_names(statements: &Statements<'_>) -> Vec<(String, usize)> {
@@ -94,6 +94,8 @@ fn read_axis<'a>(
         high: high.value,
         low_side: Side::Reflect,
         high_side: Side::Reflect,
+        low_side_span: axis.name.span,
+        high_side_span: axis.name.span,
         span: axis.name.span.to(high.span),
     })
 }
@@ -164,8 +166,8 @@ fn set_sides<'a>(
         for (end, name) in names.into_iter().enumerate() {
             match set[axis_idx][end] {
                 None => missing.push(name),
-                Some((side, _)) if end == 0 => axis.low_side = side,
-                Some((side, _)) => axis.high_side = side,
+                Some((side, span)) if end == 0 => (axis.low_side, axis.low_side_span) = (side, span),
+                Some((side, span)) => (axis.high_side, axis.high_side_span) = (side, span),
             }
         }
         is_right &= check_periodic(checker, &set[axis_idx], axis, names);

@@ -25,6 +25,7 @@ use crate::units::Dimension;
 use expression::Expr;
 
 pub use collect::resolve;
+pub use geometry::MAX_BINS;
 pub use measure::{Fact, Field, FieldTarget, Norm, Scalar};
 pub use places::SAME_TIME;
 
@@ -115,6 +116,9 @@ pub struct Axis {
     pub high: f64,
     pub low_side: Side,
     pub high_side: Side,
+    /// Where the `boundary` statements name them.
+    pub low_side_span: Span,
+    pub high_side_span: Span,
     pub span: Span,
 }
 

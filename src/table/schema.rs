@@ -137,7 +137,7 @@ pub fn columns(kind: Kind) -> Vec<Column> {
             columns.push(species());
             columns.push(row_value(
                 "amount",
-                "amount in the domain: sum of particle volume times concentration",
+                "amount of all particles, those outside of open sides included: sum of volume times concentration",
             ));
         }
         Kind::Mixing => {

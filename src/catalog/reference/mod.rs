@@ -78,7 +78,7 @@ pub enum Predicts {
     Covariance,
     /// γ of the pair: `mixing`.
     Gamma,
-    /// Amount in the domain: `total`.
+    /// Amount: `total`.
     Total,
 }
 
