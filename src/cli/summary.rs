@@ -61,7 +61,7 @@ impl Summary<'_> {
         }
         let header = [("measure", Align::Left), ("value", Align::Right), ("unit", Align::Left)];
         let cells = |measure: &Value| {
-            let value = measure.value.map_or("not defined".to_owned(), |value| significant(value, 5));
+            let value = shown(measure.value, 5);
             vec![measure.name.clone(), value, measure.unit.clone()]
         };
         table(&header, &self.measures.iter().map(cells).collect::<Vec<_>>())
@@ -142,11 +142,14 @@ fn error_cells(row: &ErrorRow) -> Vec<String> {
     let relative = row.relative;
     let norms =
         [relative.map(|n| n.l1), relative.map(|n| n.l2), relative.map(|n| n.linf), relative_noise(row)];
-    let shown =
-        |value: Option<f64>| value.filter(|v| v.is_finite()).map_or("–".to_owned(), |v| significant(v, 3));
-    cells.extend(norms.map(shown));
-    cells.extend([significant(row.norms.rmse, 3), row.unit.clone()]);
+    cells.extend(norms.map(|norm| shown(norm, 3)));
+    cells.extend([shown(Some(row.norms.rmse), 3), row.unit.clone()]);
     cells
+}
+
+/// A number, or a dash where there is none.
+fn shown(value: Option<f64>, n_digits: usize) -> String {
+    value.filter(|value| value.is_finite()).map_or("–".to_owned(), |value| significant(value, n_digits))
 }
 
 /// The noise divided by the same norm of the reference as L2.
@@ -322,5 +325,18 @@ mod tests {
         assert_eq!(value["errors"][0]["species"], serde_json::json!(["A", "B"]));
         assert_eq!(value["measures"][0]["value"], serde_json::Value::Null);
         assert_eq!(value["mass_defect"], 3e-15);
+    }
+
+    #[test]
+    fn what_is_no_number_is_a_dash() {
+        let outcome = outcome();
+        let mut row = error(None, Some(f64::NAN));
+        row.norms.rmse = f64::INFINITY;
+        let value = |value| Value { name: "m".to_owned(), unit: "1".to_owned(), value };
+        let measures = [value(None), value(Some(f64::INFINITY)), value(Some(f64::NAN))];
+        let shown = summary(&outcome, &[row], &measures).text();
+        assert!(!shown.contains("inf") && !shown.contains("NaN"), "{shown}");
+        // L2 and RMSE of the row, its absent noise, and three measures.
+        assert_eq!(shown.matches('–').count(), 6, "{shown}");
     }
 }

@@ -4,10 +4,12 @@
 //! It deliberately decides nothing: the phases decide, this module carries.
 
 pub mod codes;
+mod number;
 pub mod render;
 
 use crate::source::Span;
 pub use codes::Code;
+pub use number::{number, precise};
 
 /// How a message weighs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize)]

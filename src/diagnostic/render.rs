@@ -36,6 +36,9 @@ pub fn json(diagnostics: &[Diagnostic], sources: &Sources) -> String {
     diagnostics.iter().map(|diagnostic| json_line(diagnostic, sources) + "\n").collect()
 }
 
+/// Headers are broken before they get longer than this many characters.
+const MAX_HEADER_WIDTH: usize = 110;
+
 /// The word in a header.
 pub fn severity_word(severity: Severity) -> &'static str {
     match severity {
@@ -100,11 +103,32 @@ fn codespan_block(diagnostic: &Diagnostic, sources: &Sources) -> codespan::Diagn
         Severity::Error => codespan::Severity::Error,
     };
     let labels = diagnostic.labels.iter().filter(|label| is_in_sources(label, sources));
+    // `severity[code]: ` stands before the message.
+    let prefix = severity_word(diagnostic.severity).len() + diagnostic.code.0.len() + 4;
     codespan::Diagnostic::new(severity)
         .with_code(diagnostic.code.0)
-        .with_message(visible(&diagnostic.message))
+        .with_message(wrapped(&visible(&diagnostic.message), prefix))
         .with_labels(labels.map(|label| codespan_label(label, sources)).collect())
         .with_notes(all_notes(diagnostic))
+}
+
+/// A long message on several lines, broken at blanks; the first line begins after `prefix` characters.
+fn wrapped(message: &str, prefix: usize) -> String {
+    let mut text = String::new();
+    let mut column = prefix;
+    for word in message.split(' ') {
+        let width = word.chars().count();
+        if !text.is_empty() && column + 1 + width > MAX_HEADER_WIDTH {
+            text.push_str("\n  ");
+            column = 2;
+        } else if !text.is_empty() {
+            text.push(' ');
+            column += 1;
+        }
+        text.push_str(word);
+        column += width;
+    }
+    text
 }
 
 fn codespan_label(label: &Label, sources: &Sources) -> codespan::Label<usize> {

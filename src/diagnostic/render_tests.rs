@@ -137,3 +137,18 @@ fn json_has_every_field_and_character_columns() {
     });
     assert_eq!(value, want);
 }
+
+#[test]
+fn a_long_header_is_broken_at_blanks_and_stays_one_line_in_json() {
+    let message = format!("left out: {}", vec!["something (for a reason)"; 12].join(", "));
+    let diagnostic = Diagnostic::remark(Code("L010"), message.clone());
+    let shown = plain(diagnostic.clone(), "a.lam", SCENE);
+    let lines: Vec<&str> = shown.trim_end().lines().collect();
+    assert!(lines.len() > 2 && lines.iter().all(|line| line.chars().count() <= 110), "{shown}");
+    assert!(lines[1..].iter().all(|line| line.starts_with("  ") && !line.starts_with("   ")), "{shown}");
+    let joined = lines.iter().map(|line| line.trim()).collect::<Vec<_>>().join(" ");
+    assert_eq!(joined, format!("note[L010]: {message}"));
+    let json: serde_json::Value =
+        serde_json::from_str(&json(&[diagnostic], &Sources::single("a.lam", SCENE))).expect("JSON");
+    assert_eq!(json["message"], message);
+}

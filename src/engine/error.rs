@@ -1,8 +1,9 @@
 //! What can stop a run, in words that name the step, the particle and the component.
 //!
-//! Owns the run's errors. May use nothing else of the crate. It deliberately holds no spans: a plan
+//! Owns the run's errors. May use the numbers of `diagnostic`. It deliberately holds no spans: a plan
 //! has none.
 
+use crate::diagnostic::precise;
 use std::fmt;
 
 /// Why a run stopped. Steps count from 1, as the first step leads from time 0 to the first time;
@@ -52,7 +53,8 @@ impl fmt::Display for RunError {
             Self::Plan(what) => write!(f, "the plan is not sound: {what}"),
             Self::NonFiniteInitial { component, particle, position } => write!(
                 f,
-                "the initial value of `{component}` is not a finite number for particle {particle} at {position:?} m"
+                "the initial value of `{component}` is not a finite number for particle {particle} at {} m",
+                place(position)
             ),
             Self::NonFinitePosition { step, particle } => {
                 write!(f, "step {step}: the position of particle {particle} is not a finite number")
@@ -63,17 +65,26 @@ impl fmt::Display for RunError {
             Self::NegativeConcentration { step: 0, particle, component, value } => {
                 write!(
                     f,
-                    "the initial concentration of `{component}` is negative for particle {particle} ({value:e})"
+                    "the initial concentration of `{component}` is negative for particle {particle} ({})",
+                    precise(*value)
                 )
             }
             Self::NegativeConcentration { step, particle, component, value } => {
-                write!(f, "step {step}: `{component}` of particle {particle} became negative ({value:e})")
+                write!(
+                    f,
+                    "step {step}: `{component}` of particle {particle} became negative ({})",
+                    precise(*value)
+                )
             }
             Self::MassLost { step, component, defect } if !defect.is_finite() => {
                 write!(f, "step {step}: the amount of `{component}` is not a finite number")
             }
             Self::MassLost { step, component, defect } => {
-                write!(f, "step {step}: the amount of `{component}` changed by {defect:e} of itself")
+                write!(
+                    f,
+                    "step {step}: the amount of `{component}` changed by {} of itself",
+                    precise(*defect)
+                )
             }
             Self::OutOfMemory { bytes } => write!(f, "no memory for {bytes} bytes of particles"),
             Self::Threads(what) => write!(f, "the threads could not be started: {what}"),
@@ -83,4 +94,28 @@ impl fmt::Display for RunError {
     }
 }
 
+/// One coordinate, or several in brackets.
+fn place(position: &[f64]) -> String {
+    let list: Vec<String> = position.iter().map(|&x| precise(x)).collect();
+    if let [only] = &list[..] { only.clone() } else { format!("({})", list.join(", ")) }
+}
+
 impl std::error::Error for RunError {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_and_values_read_like_numbers() {
+        let at = |position: &[f64]| {
+            RunError::NonFiniteInitial { component: "A".into(), particle: 7, position: position.to_vec() }
+                .to_string()
+        };
+        assert!(at(&[1.11]).ends_with("for particle 7 at 1.11 m"), "{}", at(&[1.11]));
+        assert!(at(&[1.11, 2e300]).ends_with("at (1.11, 2e300) m"), "{}", at(&[1.11, 2e300]));
+        let negative =
+            RunError::NegativeConcentration { step: 3, particle: 7, component: "A".into(), value: -1.0 };
+        assert!(negative.to_string().ends_with("became negative (-1)"), "{negative}");
+    }
+}

@@ -3,6 +3,7 @@
 use super::compile::Compiled;
 use super::cost::n_stored_values;
 use super::{Normals, Plan, Quantity, Side, Stage, ZoneRate};
+use crate::diagnostic::number;
 use std::fmt::Write as _;
 
 /// The text of `lamella plan`.
@@ -35,20 +36,6 @@ fn section(text: &mut String, heading: &str, lines: &[String]) {
 
 fn axis_name(index: usize) -> &'static str {
     ["x", "y", "z"][index]
-}
-
-/// A number as people read it: few digits, no exponent where it is short without.
-pub fn number(value: f64) -> String {
-    let magnitude = value.abs();
-    if value == 0.0 || (1e-3..1e6).contains(&magnitude) {
-        let text = format!("{value:.6}");
-        let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
-        text.to_owned()
-    } else {
-        let text = format!("{value:.4e}");
-        let (mantissa, exponent) = text.split_once('e').unwrap_or((&text, "0"));
-        format!("{}e{exponent}", mantissa.trim_end_matches('0').trim_end_matches('.'))
-    }
 }
 
 /// A whole number with blanks between thousands.

@@ -4,11 +4,10 @@
 //! refused at its line, with the one that would. May use `scenario` for the places.
 
 use super::cost::{self, Cost};
-use super::explain::number;
 use super::passes::Draft;
 use super::{Plan, Side, ZoneRate};
-use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{N101, N102, N103, N104, N105, N201, N202, N203, N301};
+use crate::diagnostic::{Diagnostic, number};
 use crate::scenario::{MAX_BINS, Scenario};
 use crate::source::Span;
 use serde::Serialize;

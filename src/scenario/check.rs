@@ -2,8 +2,8 @@
 
 use super::expression::{Expr, Node, Type};
 use super::scope::{BUILT_IN_FUNCTIONS, Locals, Origin, Progress, Scope};
-use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{D005, D006, D008, D009, U101, U103, U106, U108};
+use crate::diagnostic::{Diagnostic, precise};
 use crate::maths::operator::{Binary, Unary};
 use crate::source::Span;
 use crate::syntax::tree::{self, BinaryOperator, ExprKind, UnaryOperator};
@@ -334,6 +334,7 @@ impl<'a> Checker<'a> {
             if let (Some(value), Type::Number(Dimension::NONE), Type::Number(dimension)) =
                 (bare.value(), bare.kind, other.kind)
             {
+                let value = precise(value);
                 message = message
                     .help(format!("if {value} has a unit, write it: `{value} {}`", dimension.unit_text()));
             }

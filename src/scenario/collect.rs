@@ -5,8 +5,8 @@ use super::expression::Type;
 use super::scope::{Origin, Progress, Scope};
 use super::settings::{check_setting, read_settings, unit_as_written};
 use super::{Parameter, Scenario, Settings};
-use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{D001, D010, M001, M002, M018, P002};
+use crate::diagnostic::{Diagnostic, precise};
 use crate::source::{Sources, Span};
 use crate::syntax::tree::{self, StatementKind};
 
@@ -314,8 +314,8 @@ fn parameters<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> Vec
                 Diagnostic::error(P002, format!("`{name}` lies outside of its range"))
                     .at(given.value.span, "this value")
                     .also(low.span.to(high.span), "this range")
-                    .found(format!("{value} (SI)"))
-                    .expected(format!("{} to {} (SI)", low.value, high.value)),
+                    .found(format!("{} (SI)", precise(value)))
+                    .expected(format!("{} to {} (SI)", precise(low.value), precise(high.value))),
             );
         }
         list.push(Parameter {

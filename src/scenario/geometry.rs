@@ -4,8 +4,8 @@ use super::check::Checker;
 use super::collect::Statements;
 use super::slot::tuple_parts;
 use super::{Axis, Domain, Side};
-use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{D009, M001, M002, M004, M006, M007, M008};
+use crate::diagnostic::{Diagnostic, precise};
 use crate::source::{Span, Spanned};
 use crate::syntax::tree;
 use crate::units::Dimension;
@@ -288,7 +288,7 @@ fn check_tensor(checker: &mut Checker<'_>, written: &tree::Expr, tensor: &[[f64;
     let (label, found) = if !is_symmetric {
         ("it is not symmetric".to_owned(), "a tensor that is not symmetric".to_owned())
     } else if smallest < -1e-12 * largest {
-        let found = format!("the negative eigenvalue {smallest:e} m^2/s");
+        let found = format!("the negative eigenvalue {} m^2/s", precise(smallest));
         (format!("it has {found}"), found)
     } else {
         return Some(());
@@ -350,12 +350,6 @@ pub(super) fn grid<'a>(
         return None;
     }
     let total: f64 = values.iter().map(|&count| count as f64).product();
-    checker.require(
-        total <= MAX_BINS,
-        "the number of bins in all",
-        total.to_string(),
-        "at most 1e8",
-        place,
-    )?;
+    checker.require(total <= MAX_BINS, "the number of bins in all", precise(total), "at most 1e8", place)?;
     Some(Spanned::new(values.into_iter().map(|count| count as usize).collect(), place))
 }

@@ -6,8 +6,8 @@ use super::expression::{Expr, Type};
 use super::scope::Origin;
 use super::slot::collect_names;
 use super::{Particles, Placement, Run, Species};
-use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{D002, D005, D006, M001, M004, M005, M009};
+use crate::diagnostic::{Diagnostic, precise};
 use crate::source::Span;
 use crate::syntax::tree;
 use crate::units::Dimension;
@@ -182,7 +182,13 @@ fn initial_of<'a>(
         && let Some(value) = expr.value()
         && value < 0.0
     {
-        checker.require(false, &what, format!("{value} (SI)"), "zero or more", assignment.value.span);
+        checker.require(
+            false,
+            &what,
+            format!("{} (SI)", precise(value)),
+            "zero or more",
+            assignment.value.span,
+        );
     }
     initials[idx] = match (checked, kind) {
         (Some(expr), Some(_)) => Initial::Known(expr),
@@ -245,13 +251,13 @@ pub(super) fn particles<'a>(checker: &mut Checker<'a>, statements: &Statements<'
 pub(super) fn run<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> Option<Run> {
     let (span, written) = statements.run?;
     let duration = checker.slot(&written.duration, "the duration", Dimension::TIME).and_then(|duration| {
-        let found = format!("{} s", duration.value);
+        let found = format!("{} s", precise(duration.value));
         checker.require(duration.value > 0.0, "the duration", found, "above zero", duration.span)?;
         Some(duration)
     });
     let step = match &written.step {
         Some(step) => checker.slot(step, "the step", Dimension::TIME).and_then(|step| {
-            let found = format!("{} s", step.value);
+            let found = format!("{} s", precise(step.value));
             checker.require(step.value > 0.0, "the step", found, "above zero", step.span)?;
             Some(step)
         }),

@@ -5,8 +5,8 @@ use super::collect::Statements;
 use super::geometry::{count_of, grid};
 use super::model::species_index;
 use super::{Output, OutputKind};
-use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{D009, M001, M002, M004, U104, U105};
+use crate::diagnostic::{Diagnostic, precise};
 use crate::source::{Span, Spanned};
 use crate::syntax::tree;
 use crate::units::{Dimension, Unit};
@@ -152,8 +152,8 @@ pub(super) fn time_list<'a>(
         .map(|time| {
             let value = checker.slot(time, "an output time", Dimension::TIME)?;
             let Some(duration) = duration else { return Some(value.value) };
-            let rule = format!("from 0 s to the end of the run, {duration} s");
-            let found = format!("{} s", value.value);
+            let rule = format!("from 0 s to the end of the run, {} s", precise(duration));
+            let found = format!("{} s", precise(value.value));
             let is_fine = (0.0..=duration).contains(&value.value);
             checker.require(is_fine, "an output time", found, &rule, value.span)?;
             Some(value.value)
@@ -167,12 +167,12 @@ pub(super) fn time_list<'a>(
 
 fn every<'a>(checker: &mut Checker<'a>, interval: &'a tree::Expr, duration: Option<f64>) -> Option<Vec<f64>> {
     let interval = checker.slot(interval, "the interval of an output", Dimension::TIME)?;
-    let found = format!("{} s", interval.value);
+    let found = format!("{} s", precise(interval.value));
     checker.require(interval.value > 0.0, "the interval of an output", found, "above zero", interval.span)?;
     let duration = duration?;
     // A run that is a whole number of intervals long ends with an output, whatever the rounding.
     let n_intervals = (duration / interval.value * (1.0 + 1e-12)).floor();
-    let found = format!("{n_intervals} times");
+    let found = format!("{} times", precise(n_intervals));
     checker.require(
         n_intervals < MAX_TIMES,
         "the number of output times",

@@ -7,7 +7,7 @@ use super::observe::OUTPUTS;
 use super::{Output, OutputKind, Reference, Solution, Target};
 use crate::catalog::reference::{self as catalogue, ArgumentDimension, Item, Predicts};
 use crate::diagnostic::codes::{D002, D007, M004, M005, M014, M016};
-use crate::diagnostic::{Diagnostic, did_you_mean};
+use crate::diagnostic::{Diagnostic, did_you_mean, precise};
 use crate::source::Span;
 use crate::syntax::tree::{self, ExprKind};
 use crate::units::Dimension;
@@ -211,9 +211,9 @@ fn item_solution<'a>(
         let what = format!("argument `{}` of `{}`", argument.name, item.name);
         let (low, high) = argument.range;
         let value = checker.slot(written, &what, dimension).and_then(|value| {
-            let rule = format!("{} ({low} to {high} in SI)", argument.doc);
+            let rule = format!("{} ({} to {} in SI)", argument.doc, precise(low), precise(high));
             let is_fine = (low..=high).contains(&value.value);
-            checker.require(is_fine, &what, format!("{} (SI)", value.value), &rule, value.span)?;
+            checker.require(is_fine, &what, format!("{} (SI)", precise(value.value)), &rule, value.span)?;
             Some(value.value)
         });
         match value {
@@ -249,7 +249,7 @@ fn signature(item: &Item) -> String {
         .arguments
         .iter()
         .map(|argument| match argument.default {
-            Some(value) => format!("{} = {value}", argument.name),
+            Some(value) => format!("{} = {}", argument.name, precise(value)),
             None => argument.name.to_owned(),
         })
         .collect();

@@ -3,8 +3,8 @@
 use super::check::{Allow, Checker};
 use super::expression::{Expr, Type};
 use super::scope::{Origin, Progress};
-use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{D009, M004, M005, U103, U104};
+use crate::diagnostic::{Diagnostic, precise};
 use crate::source::Span;
 use crate::syntax::tree::{self, ExprKind};
 use crate::units::Dimension;
@@ -108,11 +108,11 @@ impl<'a> Checker<'a> {
 
     /// A whole number of at least one, written or from a parameter.
     pub(super) fn count(&mut self, value: f64, what: &str, most: f64, span: Span) -> Option<u64> {
-        let rule = format!("a whole number from 1 to {most}");
+        let rule = format!("a whole number from 1 to {}", precise(most));
         self.require(
             value.fract() == 0.0 && (1.0..=most).contains(&value),
             what,
-            value.to_string(),
+            precise(value),
             &rule,
             span,
         )?;
@@ -142,7 +142,7 @@ impl<'a> Checker<'a> {
             self.report(
                 Diagnostic::error(M005, format!("{what} is empty"))
                     .at(span, "the first bound must lie below the second")
-                    .found(format!("{low} .. {high} (SI)"))
+                    .found(format!("{} .. {} (SI)", precise(low), precise(high)))
                     .expected("a lower bound, `..`, an upper bound"),
             );
             return None;

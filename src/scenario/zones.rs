@@ -3,8 +3,8 @@
 use super::check::Checker;
 use super::collect::Statements;
 use super::{Mixing, Zone};
-use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{D002, M001, M002, M013};
+use crate::diagnostic::{Diagnostic, precise};
 use crate::syntax::tree::{self, ExprKind};
 use crate::units::Dimension;
 
@@ -100,7 +100,7 @@ fn read_zone<'a>(checker: &mut Checker<'a>, zone: &'a tree::Zone) -> Option<Zone
     let share = checker.slot(&fraction.value, "a fraction", Dimension::NONE);
     let share = share.and_then(|share| {
         let is_fine = (0.0..=1.0).contains(&share.value);
-        checker.require(is_fine, "a fraction", share.value.to_string(), "from 0 to 1", share.span)?;
+        checker.require(is_fine, "a fraction", precise(share.value), "from 0 to 1", share.span)?;
         Some(share.value)
     });
     let is_instant =
@@ -112,7 +112,7 @@ fn read_zone<'a>(checker: &mut Checker<'a>, zone: &'a tree::Zone) -> Option<Zone
             checker.require(
                 speed.value >= 0.0,
                 "an exchange rate",
-                speed.value.to_string(),
+                precise(speed.value),
                 "zero or more",
                 speed.span,
             )?;

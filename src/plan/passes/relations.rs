@@ -6,6 +6,7 @@
 //! functions (indicators of conditions, coordinates, anything not linear) and eliminating.
 
 use super::Draft;
+use crate::diagnostic::number;
 use crate::maths::operator::{Binary, Unary};
 use crate::plan::tape::{Operation, Register, Tape};
 use std::collections::BTreeMap;
@@ -56,14 +57,15 @@ fn note(draft: &mut Draft, relations: &[Option<Relation>]) {
             .map(|(component, factor)| match *factor {
                 1.0 => format!(" + {}", name(*component)),
                 -1.0 => format!(" - {}", name(*component)),
-                factor if factor < 0.0 => format!(" - {} {}", -factor, name(*component)),
-                factor => format!(" + {factor} {}", name(*component)),
+                factor if factor < 0.0 => format!(" - {} {}", number(-factor), name(*component)),
+                factor => format!(" + {} {}", number(factor), name(*component)),
             })
             .collect();
+        let constant = number(relation.constant);
         let why = if relation.terms.is_empty() {
-            format!("{} everywhere and always, restored at output", relation.constant)
+            format!("{constant} everywhere and always, restored at output")
         } else {
-            format!("{}{} everywhere, restored at output", relation.constant, terms.concat())
+            format!("{constant}{} everywhere, restored at output", terms.concat())
         };
         notes.push((format!("carrying species `{}`", name(idx)), why));
     }
