@@ -2,6 +2,7 @@
 
 mod basics;
 mod files;
+mod overhead;
 mod program;
 mod runs;
 mod scenes;
