@@ -99,25 +99,6 @@ impl Plan {
     }
 }
 
-impl OutputKind {
-    /// The word of the language.
-    pub fn word(self) -> &'static str {
-        match self {
-            OutputKind::Profile => "profile",
-            OutputKind::Covariance => "covariance",
-            OutputKind::Map => "map",
-            OutputKind::Total => "total",
-            OutputKind::Mixing => "mixing",
-            OutputKind::Particles => "particles",
-        }
-    }
-
-    /// Whether its values belong to pairs of species.
-    pub fn is_of_pairs(self) -> bool {
-        matches!(self, OutputKind::Covariance | OutputKind::Mixing)
-    }
-}
-
 fn require(is_right: bool, otherwise: impl FnOnce() -> String) -> Result<(), String> {
     if is_right { Ok(()) } else { Err(otherwise()) }
 }

@@ -2,7 +2,7 @@
 
 use super::compile::Compiled;
 use super::cost::n_stored_values;
-use super::{Normals, Plan, Quantity, Side, Stage, ZoneRate};
+use super::{Normals, Plan, Quantity, Stage, ZoneRate};
 use crate::diagnostic::number;
 use std::fmt::Write as _;
 
@@ -51,14 +51,6 @@ pub fn grouped(value: u64) -> String {
     text
 }
 
-fn side(side: Side) -> &'static str {
-    match side {
-        Side::Reflect => "reflect",
-        Side::Periodic => "periodic",
-        Side::Open => "open",
-    }
-}
-
 fn scene_lines(plan: &Plan) -> Vec<String> {
     let mut lines = vec![
         format!(
@@ -77,8 +69,8 @@ fn scene_lines(plan: &Plan) -> Vec<String> {
             axis_name(axis.index),
             number(axis.low),
             number(axis.high),
-            side(axis.low_side),
-            side(axis.high_side),
+            axis.low_side.word(),
+            axis.high_side.word(),
             axis.bins,
             number(plan.walk.drift[idx]),
             number(dispersion),

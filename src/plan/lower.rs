@@ -3,8 +3,8 @@
 use super::build_tape::build_tape;
 use super::evaluation::{self, Evaluation};
 use super::{
-    Axis, Component, InstantReaction, Mixing, NUMERICS_VERSION, Normals, Output, OutputKind, OutputUnit,
-    Particles, Placement, Plan, Quantity, Side, Species, Stage, Time, Walk, Zone, ZoneRate,
+    Axis, Component, InstantReaction, Mixing, NUMERICS_VERSION, Normals, Output, OutputUnit, Particles, Plan,
+    Quantity, Species, Stage, Time, Walk, Zone, ZoneRate,
 };
 use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::D008;
@@ -29,11 +29,7 @@ pub fn lower(scenario: &Scenario) -> Result<(Plan, Evaluation), Vec<Diagnostic>>
         walk: walk(scenario),
         particles: Particles {
             count: scenario.particles.count,
-            placement: match scenario.particles.placement {
-                scenario::Placement::Random => Placement::Random,
-                scenario::Placement::Stratified => Placement::Stratified,
-                scenario::Placement::Ordered => Placement::Ordered,
-            },
+            placement: scenario.particles.placement,
             volume: volume / scenario.particles.count as f64,
         },
         species: scenario
@@ -55,17 +51,12 @@ pub fn lower(scenario: &Scenario) -> Result<(Plan, Evaluation), Vec<Diagnostic>>
 }
 
 fn lower_axis(axis: &scenario::Axis, bins: usize) -> Axis {
-    let side = |side| match side {
-        scenario::Side::Reflect => Side::Reflect,
-        scenario::Side::Periodic => Side::Periodic,
-        scenario::Side::Open => Side::Open,
-    };
     Axis {
         index: axis.index,
         low: axis.low,
         high: axis.high,
-        low_side: side(axis.low_side),
-        high_side: side(axis.high_side),
+        low_side: axis.low_side,
+        high_side: axis.high_side,
         bins,
     }
 }
@@ -167,19 +158,6 @@ fn time(scenario: &Scenario) -> Time {
     Time { step, n_steps: (n_steps as u64).max(1), duration }
 }
 
-impl From<scenario::OutputKind> for OutputKind {
-    fn from(kind: scenario::OutputKind) -> Self {
-        match kind {
-            scenario::OutputKind::Profile => OutputKind::Profile,
-            scenario::OutputKind::Covariance => OutputKind::Covariance,
-            scenario::OutputKind::Map => OutputKind::Map,
-            scenario::OutputKind::Total => OutputKind::Total,
-            scenario::OutputKind::Mixing => OutputKind::Mixing,
-            scenario::OutputKind::Particles => OutputKind::Particles,
-        }
-    }
-}
-
 fn lower_output(output: &scenario::Output) -> Output {
     let quantities = if output.kind.is_of_pairs() {
         output.pairs.iter().map(|&(a, b)| Quantity::Pair(a, b)).collect()
@@ -187,7 +165,7 @@ fn lower_output(output: &scenario::Output) -> Output {
         output.species.iter().map(|&species| Quantity::Species(species)).collect()
     };
     Output {
-        kind: output.kind.into(),
+        kind: output.kind,
         quantities,
         bins: output.bins.clone(),
         times: output.times.clone(),
@@ -214,7 +192,7 @@ fn evaluation(scenario: &Scenario, problems: &mut Vec<Diagnostic>) -> Evaluation
             scenario::Target::Concentration(a) | scenario::Target::Total(a) => Quantity::Species(a),
             scenario::Target::Covariance(a, b) | scenario::Target::Mixing(a, b) => Quantity::Pair(a, b),
         };
-        let outputs = reference.target.outputs().iter().map(|kind| (*kind).into()).collect();
+        let outputs = reference.target.outputs().to_vec();
         references.push(evaluation::Reference { name: reference.name.clone(), outputs, target, solution });
     }
     let measures = scenario.measures.iter().map(lower_measure).collect();
@@ -257,7 +235,7 @@ fn lower_field(field: &scenario::Field) -> evaluation::Field {
                 scenario::FieldTarget::Species(a) => Quantity::Species(a),
                 scenario::FieldTarget::Pair(a, b) => Quantity::Pair(a, b),
             };
-            To::Output((*kind).into(), quantity)
+            To::Output(*kind, quantity)
         }
         From::Reference(idx) => To::Reference(*idx),
         From::Unary(operator, a) => To::Unary(*operator, Box::new(lower_field(a))),

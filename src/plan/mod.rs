@@ -15,6 +15,7 @@ mod lower;
 pub mod passes;
 pub mod tape;
 
+pub use crate::scenario::{OutputKind, Placement, Side};
 pub use compile::{Compiled, Options, Selection, compile, hash};
 
 use serde::{Deserialize, Serialize};
@@ -58,18 +59,6 @@ pub struct Axis {
     pub bins: usize,
 }
 
-/// What happens to a particle at one side of the domain.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Side {
-    /// No flux: specular reflection.
-    Reflect,
-    /// Particles leave and come in at the opposite side. Both sides of an axis or none.
-    Periodic,
-    /// Particles walk on outside; they are counted in totals, not in bins.
-    Open,
-}
-
 /// `X ← X + drift·Δt + B ξ √Δt`, `B Bᵀ = 2 D` (Itô–Euler; exact in law for constant coefficients).
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Walk {
@@ -97,19 +86,6 @@ pub struct Particles {
     /// Fluid volume of one particle: m, m² or m³ over the axes of the scene (an axis that was left
     /// out still counts with its length).
     pub volume: f64,
-}
-
-/// Where particles start.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Placement {
-    /// Uniform and independent.
-    Random,
-    /// One axis: particle p uniform in the p-th of `count` equal intervals. More axes: the domain is
-    /// cut into a grid of nearly cubic cells with equal numbers (±1) of uniform particles in each.
-    Stratified,
-    /// Centres of the strata, no randomness.
-    Ordered,
 }
 
 /// A species and how to restore it from what particles carry.
@@ -194,23 +170,6 @@ pub struct Output {
     pub times: Vec<f64>,
     /// Unit of the values as written by the user; `None` is SI.
     pub unit: Option<OutputUnit>,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum OutputKind {
-    /// Mean concentration and its standard error per bin along one axis.
-    Profile,
-    /// Covariance of unreacted concentrations of a pair within bins along one axis, times n/(n−1).
-    Covariance,
-    /// Mean concentration per bin over all active axes.
-    Map,
-    /// Amount of all particles, those outside of open sides included: Σ volume · C.
-    Total,
-    /// M = ∫⟨C_a C_b⟩, M_mean = ∫ c̄_a c̄_b, M_cov, γ = M_cov / M_mean, of unreacted concentrations.
-    Mixing,
-    /// Every particle with position and concentrations.
-    Particles,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -1,6 +1,7 @@
 //! Domain, sides, frame, flow, dispersion and bins.
 
 use super::check::Checker;
+use super::choice::SIDES;
 use super::collect::Statements;
 use super::slot::tuple_parts;
 use super::{Axis, Domain, Side};
@@ -12,8 +13,6 @@ use crate::units::Dimension;
 
 const AXES: [&str; 3] = ["x", "y", "z"];
 const SHAPES: &[(&str, usize)] = &[("line", 1), ("rect", 2), ("box", 3)];
-const SIDES: &[(&str, Side)] =
-    &[("reflect", Side::Reflect), ("open", Side::Open), ("periodic", Side::Periodic)];
 
 /// Bins along one axis, and in all.
 pub const MAX_BINS: f64 = 1e8;

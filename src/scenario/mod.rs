@@ -5,6 +5,7 @@
 
 mod call;
 mod check;
+mod choice;
 mod collect;
 pub mod expression;
 mod geometry;
@@ -24,6 +25,7 @@ use crate::source::{Span, Spanned};
 use crate::units::Dimension;
 use expression::Expr;
 
+pub use choice::{OutputKind, Placement, Side};
 pub use collect::resolve;
 pub use geometry::MAX_BINS;
 pub use measure::{Fact, Field, FieldTarget, Norm, Scalar};
@@ -122,13 +124,6 @@ pub struct Axis {
     pub span: Span,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Side {
-    Reflect,
-    Periodic,
-    Open,
-}
-
 #[derive(Debug, Clone, PartialEq)]
 pub struct Mixing {
     pub span: Span,
@@ -153,13 +148,6 @@ pub struct Particles {
     pub placement: Placement,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Placement {
-    Random,
-    Stratified,
-    Ordered,
-}
-
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
     pub span: Span,
@@ -167,16 +155,6 @@ pub struct Run {
     pub step: f64,
     pub step_span: Span,
     pub are_normals_double: bool,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum OutputKind {
-    Profile,
-    Covariance,
-    Map,
-    Total,
-    Mixing,
-    Particles,
 }
 
 #[derive(Debug, Clone, PartialEq)]

@@ -1,6 +1,7 @@
 //! Species, reactions, mixing zones, particles and the run itself.
 
 use super::check::{Allow, Checker, label_circle};
+use super::choice::PLACEMENTS;
 use super::collect::Statements;
 use super::expression::{Expr, Type};
 use super::scope::Origin;
@@ -233,13 +234,8 @@ fn spread_dimensions(checker: &mut Checker<'_>, statements: &Statements<'_>) {
 pub(super) fn particles<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> Option<Particles> {
     let (span, written) = statements.particles?;
     let kind = checker.word(&written.kind, "a kind of particle", &[("fluid", ())]);
-    let placements = [
-        ("stratified", Placement::Stratified),
-        ("random", Placement::Random),
-        ("ordered", Placement::Ordered),
-    ];
     let placement = match &written.placement {
-        Some(name) => checker.word(name, "a placement", &placements),
+        Some(name) => checker.word(name, "a placement", PLACEMENTS),
         None => Some(Placement::Random),
     };
     let count = checker.slot(&written.count, "the number of particles", Dimension::NONE)?;

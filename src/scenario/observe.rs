@@ -1,6 +1,7 @@
 //! Outputs: what, when, on which bins, in which unit.
 
 use super::check::Checker;
+pub(super) use super::choice::OUTPUTS;
 use super::collect::Statements;
 use super::geometry::{count_of, grid};
 use super::model::species_index;
@@ -11,28 +12,10 @@ use crate::source::{Span, Spanned};
 use crate::syntax::tree;
 use crate::units::{Dimension, Unit};
 
-pub(super) const OUTPUTS: &[(&str, OutputKind)] = &[
-    ("profile", OutputKind::Profile),
-    ("covariance", OutputKind::Covariance),
-    ("map", OutputKind::Map),
-    ("total", OutputKind::Total),
-    ("mixing", OutputKind::Mixing),
-    ("particles", OutputKind::Particles),
-];
-
 /// Observations that one output may ask for.
 const MAX_TIMES: f64 = 1e6;
 
 impl OutputKind {
-    pub fn word(self) -> &'static str {
-        OUTPUTS.iter().find(|(_, kind)| *kind == self).map_or("", |(word, _)| word)
-    }
-
-    /// Whether its values belong to pairs of species.
-    pub fn is_of_pairs(self) -> bool {
-        matches!(self, OutputKind::Covariance | OutputKind::Mixing)
-    }
-
     /// The dimension of its values for a concentration of dimension `c` in a domain of `n` axes.
     pub fn dimension(self, c: Dimension, n_axes: usize) -> Dimension {
         let volume = Dimension::LENGTH.power(n_axes as i32, 1).unwrap_or(Dimension::NONE);

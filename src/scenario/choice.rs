@@ -1,0 +1,87 @@
+//! Choices among words that go into the plan as they are.
+//!
+//! Owns the types and their words. May use `serde`, as the plan is written. It deliberately holds no
+//! numbers and no places.
+
+use serde::{Deserialize, Serialize};
+
+/// What happens to a particle at one side of the domain.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Side {
+    /// No flux: specular reflection.
+    Reflect,
+    /// Particles leave and come in at the opposite side. Both sides of an axis or none.
+    Periodic,
+    /// Particles walk on outside; they are counted in totals, not in bins.
+    Open,
+}
+
+pub(super) const SIDES: &[(&str, Side)] =
+    &[("reflect", Side::Reflect), ("open", Side::Open), ("periodic", Side::Periodic)];
+
+impl Side {
+    /// The word of the language.
+    pub fn word(self) -> &'static str {
+        word(SIDES, self)
+    }
+}
+
+/// Where particles start.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Placement {
+    /// Uniform and independent.
+    Random,
+    /// One axis: particle p uniform in the p-th of `count` equal intervals. More axes: the domain is
+    /// cut into a grid of nearly cubic cells with equal numbers (±1) of uniform particles in each.
+    Stratified,
+    /// Centres of the strata, no randomness.
+    Ordered,
+}
+
+pub(super) const PLACEMENTS: &[(&str, Placement)] =
+    &[("stratified", Placement::Stratified), ("random", Placement::Random), ("ordered", Placement::Ordered)];
+
+/// What is observed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OutputKind {
+    /// Mean concentration and its standard error per bin along one axis.
+    Profile,
+    /// Covariance of unreacted concentrations of a pair within bins along one axis, times n/(n−1).
+    Covariance,
+    /// Mean concentration per bin over all active axes.
+    Map,
+    /// Amount of all particles, those outside of open sides included: Σ volume · C.
+    Total,
+    /// M = ∫⟨C_a C_b⟩, M_mean = ∫ c̄_a c̄_b, M_cov, γ = M_cov / M_mean, of unreacted concentrations.
+    Mixing,
+    /// Every particle with position and concentrations.
+    Particles,
+}
+
+pub(super) const OUTPUTS: &[(&str, OutputKind)] = &[
+    ("profile", OutputKind::Profile),
+    ("covariance", OutputKind::Covariance),
+    ("map", OutputKind::Map),
+    ("total", OutputKind::Total),
+    ("mixing", OutputKind::Mixing),
+    ("particles", OutputKind::Particles),
+];
+
+impl OutputKind {
+    /// The word of the language.
+    pub fn word(self) -> &'static str {
+        word(OUTPUTS, self)
+    }
+
+    /// Whether its values belong to pairs of species.
+    pub fn is_of_pairs(self) -> bool {
+        matches!(self, OutputKind::Covariance | OutputKind::Mixing)
+    }
+}
+
+fn word<T: Copy + PartialEq>(words: &[(&'static str, T)], wanted: T) -> &'static str {
+    words.iter().find(|(_, choice)| *choice == wanted).map_or("", |(word, _)| word)
+}
