@@ -44,6 +44,11 @@ pub fn messages(text: &str) -> Vec<Diagnostic> {
     lamella::check(Sources::single("scene.lam", text), &Settings::default(), &Options::default()).diagnostics
 }
 
+/// What the syntax alone says about a text.
+pub fn messages_of_syntax(text: &str) -> Vec<Diagnostic> {
+    parse(FileId(0), text).1
+}
+
 /// A guard against hanging, hundreds of times what a text of the noise needs.
 pub const LIMIT: Duration = Duration::from_secs(1);
 

@@ -42,21 +42,38 @@ fn swap(text: &str, tokens: &[Token], idx: usize) -> Option<Mutant> {
     (result != text).then_some(Mutant { what, text: result, place })
 }
 
-/// Each character of the token changed, dropped and doubled.
-fn misspellings(text: &str, (_, range): &Token) -> Vec<Mutant> {
+/// Each character of the token changed, dropped and doubled, and what is wrong with the whole of it.
+fn misspellings(text: &str, (kind, range): &Token) -> Vec<Mutant> {
     let word = &text[range.clone()];
     let mut mutants = Vec::new();
+    let mut add = |wrong: Vec<String>| {
+        for wrong in wrong.into_iter().filter(|wrong| !wrong.is_empty() && wrong != word) {
+            let (result, place) = replaced(text, range, &wrong);
+            mutants.push(Mutant { what: format!("`{word}` as `{wrong}`"), text: result, place });
+        }
+    };
     for (at, old) in word.char_indices() {
         let rest = &word[at + old.len_utf8()..];
         let with = |new: &str| format!("{}{new}{rest}", &word[..at]);
         let mut wrong = vec![with(""), with(&format!("{old}{old}"))];
         wrong.extend(other_characters(old).map(|new| with(&new.to_string())));
-        for wrong in wrong.into_iter().filter(|wrong| !wrong.is_empty() && wrong != word) {
-            let (result, place) = replaced(text, range, &wrong);
-            mutants.push(Mutant { what: format!("`{word}` as `{wrong}`"), text: result, place });
-        }
+        add(wrong);
     }
+    add(as_a_whole(*kind, word));
     mutants
+}
+
+/// Words with a letter too many, numbers with a letter inside or a point at the end, texts without
+/// quotes, symbols that the language does not have.
+fn as_a_whole(kind: TokenKind, word: &str) -> Vec<String> {
+    let middle = word.char_indices().nth(word.chars().count() / 2).map_or(0, |(at, _)| at);
+    let (head, tail) = word.split_at(middle);
+    match kind {
+        TokenKind::Word => vec![format!("{word}q")],
+        TokenKind::Number => vec![format!("{head}q{tail}"), format!("{word}.")],
+        TokenKind::Text => vec![word.trim_matches('"').to_owned()],
+        _ => vec!["?".to_owned()],
+    }
 }
 
 /// What may be typed in place of a character: one of its kind, and for a digit also a letter.

@@ -2,7 +2,6 @@
 
 mod expressions;
 mod format;
-mod mutants;
 mod properties;
 
 use lamella::diagnostic::Diagnostic;
