@@ -2,6 +2,9 @@
 
 mod common;
 
+use arrow_array::Array;
+use arrow_array::cast::AsArray;
+use arrow_array::types::Float64Type;
 use lamella::engine::snapshot::{Snapshot, Values};
 use lamella::plan::{OutputKind, Plan, Quantity};
 use lamella::table::{Summary, TableError, Writer, is_complete, read};
@@ -325,4 +328,58 @@ fn other_plan() -> Plan {
     plan.species.insert(0, lamella::plan::Species { name: "nitrate NO₃⁻".to_owned(), ..more });
     plan.outputs[1].unit = None;
     plan
+}
+
+/// Table, column, species and unit of each row of `columns.parquet`, with the exponents of m, kg, s and mol.
+type Meaning = ([Option<String>; 4], [Option<f64>; 4]);
+
+fn meanings(folder: &Path) -> Vec<Meaning> {
+    let file = fs::File::open(folder.join("columns.parquet")).unwrap();
+    let batches = parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder::try_new(file).unwrap();
+    let mut found = Vec::new();
+    for batch in batches.build().unwrap().map(Result::unwrap) {
+        let text = |name: &str, row: usize| {
+            let column = batch.column_by_name(name).unwrap().as_string::<i32>();
+            column.is_valid(row).then(|| column.value(row).to_owned())
+        };
+        let number = |name: &str, row: usize| {
+            let column = batch.column_by_name(name).unwrap().as_primitive::<Float64Type>();
+            column.is_valid(row).then(|| column.value(row))
+        };
+        found.extend((0..batch.num_rows()).map(|row| {
+            let texts = ["table", "column", "species", "unit"].map(|name| text(name, row));
+            (texts, ["length", "mass", "time", "amount"].map(|name| number(name, row)))
+        }));
+    }
+    found
+}
+
+#[test]
+fn every_unit_is_told_as_exponents_too() {
+    let folder = tempfile::tempdir().unwrap();
+    write(folder.path());
+    let meanings = meanings(folder.path());
+    for (texts, exponents) in &meanings {
+        let has_unit =
+            texts[3].as_ref().is_some_and(|unit| !["see column unit", "byte", "UTC"].contains(&&**unit));
+        assert!(exponents.iter().all(|exponent| exponent.is_some() == has_unit), "{texts:?}: {exponents:?}");
+    }
+    let of = |table: &str, column: &str, species: Option<&str>| -> Vec<(&str, [f64; 4])> {
+        let is_it = |(texts, _): &&Meaning| {
+            [texts[0].as_deref(), texts[1].as_deref(), texts[2].as_deref()]
+                == [Some(table), Some(column), species]
+        };
+        let found = meanings.iter().filter(is_it);
+        found
+            .map(|(texts, exponents)| (texts[3].as_deref().unwrap(), exponents.map(Option::unwrap)))
+            .collect()
+    };
+    assert_eq!(of("points", "chi", None), [("1/s", [0.0, 0.0, -1.0, 0.0])]);
+    assert_eq!(of("points", "err", None), [("mol/m^3", [-3.0, 0.0, 0.0, 1.0])]);
+    assert_eq!(of("points", "limit.profile.A.l2", None), [("mol/m^2.5", [-2.5, 0.0, 0.0, 1.0])]);
+    assert_eq!(of("profile", "concentration", Some("biomass")), [("mg/L", [-3.0, 1.0, 0.0, 0.0])]);
+    assert_eq!(of("errors", "l1", Some("A")), [("mol/m^2", [-2.0, 0.0, 0.0, 1.0])]);
+    assert_eq!(of("errors", "l2", Some("A")), [("mol/m^2.5", [-2.5, 0.0, 0.0, 1.0])]);
+    assert_eq!(of("errors", "rmse", Some("A, B")), [("mol/m^3", [-3.0, 0.0, 0.0, 1.0])]);
+    assert_eq!(of("errors", "relative_l1", None), [("1", [0.0; 4])]);
 }

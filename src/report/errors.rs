@@ -4,9 +4,8 @@
 
 use crate::measure;
 use crate::plan::{OutputKind, Plan, Quantity};
-use crate::table::{ErrorRow, Kind, Norms, Value, si_text, value_dimension};
+use crate::table::{ErrorRow, Kind, Norms, Value, integrated, si_text, value_dimension};
 use crate::units::Dimension;
-use crate::units::dimension::SCALE;
 
 /// Rows of the errors table for point 0, replicate 0.
 pub fn error_rows(plan: &Plan, n_axes: usize, rows: &[measure::ErrorRow]) -> Vec<ErrorRow> {
@@ -59,10 +58,10 @@ pub fn error_values(plan: &Plan, n_axes: usize, rows: &[measure::ErrorRow]) -> V
             .any(|other| other.output_idx != row.output_idx && self::stem(plan, other) == stem);
         let stem = if has_twin { format!("{stem}.{}", row.output_idx) } else { stem };
         let field = dimension(plan, row, n_axes);
-        let volume = volume(plan, row);
+        let integral = |root| integrated(plan, row.kind, field, root);
         let norms = [
-            ("l1", Some(row.l1), times(field, volume, 1)),
-            ("l2", Some(row.l2), times(field, volume, 2)),
+            ("l1", Some(row.l1), integral(1)),
+            ("l2", Some(row.l2), integral(2)),
             ("linf", Some(row.l_inf), field),
             ("rmse", Some(row.rmse), field),
             ("l1_relative", row.l1_relative, Dimension::NONE),
@@ -96,20 +95,4 @@ fn dimension(plan: &Plan, row: &measure::ErrorRow, n_axes: usize) -> Dimension {
         OutputKind::Mixing => Dimension::NONE,
         kind => value_dimension(plan, kind, row.quantity, n_axes),
     }
-}
-
-/// Axes that the norm integrates over: those with bins for a profile, all active ones for a map.
-fn volume(plan: &Plan, row: &measure::ErrorRow) -> i16 {
-    match row.kind {
-        OutputKind::Profile | OutputKind::Covariance => 1,
-        OutputKind::Map => plan.axes.len() as i16,
-        OutputKind::Total | OutputKind::Mixing | OutputKind::Particles => 0,
-    }
-}
-
-/// field × length^(volume / root)
-fn times(field: Dimension, volume: i16, root: i16) -> Dimension {
-    let mut product = field;
-    product.0[0] += volume * SCALE / root;
-    product
 }

@@ -6,7 +6,7 @@
 use super::footer::{doc_of, names};
 use super::record::{ErrorRow, Norms, Record};
 use super::schema::{Column, Kind, Measured};
-use super::unit::{exponent, value_unit};
+use super::unit::{ValueUnit, dimension_of, exponent, integrated, si_text, value_unit};
 use crate::plan::Plan;
 use crate::units::Dimension;
 use arrow_array::builder::StringDictionaryBuilder;
@@ -66,16 +66,17 @@ struct Meaning {
 }
 
 /// `columns.parquet`: the columns of each table, then a row per species of a value column with the
-/// unit and the scene's text for it.
+/// unit and the scene's text for it; for errors a row per kind of table and species that was compared.
 pub fn columns(
     tables: &[(String, Vec<Column>)],
+    errors: &[ErrorRow],
     plan: &Plan,
     record: &Record,
 ) -> (Vec<Column>, Vec<ArrayRef>) {
     let rows: Vec<Meaning> = tables
         .iter()
         .flat_map(|(table, columns)| columns.iter().map(move |column| (table, column)))
-        .flat_map(|(table, column)| meanings(table, column, plan, record))
+        .flat_map(|(table, column)| meanings(table, column, errors, plan, record))
         .collect();
     (column_columns(), column_arrays(&rows))
 }
@@ -117,7 +118,7 @@ fn column_arrays(rows: &[Meaning]) -> Vec<ArrayRef> {
     arrays
 }
 
-fn meanings(table: &str, column: &Column, plan: &Plan, record: &Record) -> Vec<Meaning> {
+fn meanings(table: &str, column: &Column, errors: &[ErrorRow], plan: &Plan, record: &Record) -> Vec<Meaning> {
     let row = |species, unit, dimension, description: &str| Meaning {
         table: table.to_owned(),
         column: column.name.clone(),
@@ -131,20 +132,46 @@ fn meanings(table: &str, column: &Column, plan: &Plan, record: &Record) -> Vec<M
         Measured::Fixed(dimension) => {
             vec![row(None, Some(column.unit_text(None)), Some(*dimension), &column.doc)]
         }
-        Measured::Named(unit) => vec![row(None, Some(unit.clone()), None, &column.doc)],
+        Measured::Named(unit) => vec![row(None, Some(unit.clone()), dimension_of(unit), &column.doc)],
         Measured::Row => {
             let mut rows = vec![row(None, Some(column.unit_text(None)), None, &column.doc)];
             for (species, docs, unit) in values_of(table, plan, record) {
                 let description = if docs.is_empty() { &column.doc } else { &docs };
                 rows.push(row(Some(species), Some(unit.text), Some(unit.dimension), description));
             }
+            if table == Kind::Errors.name() {
+                for (species, kind, dimension) in compared(&column.name, errors, plan) {
+                    let description = format!("{}; of {kind}", column.doc);
+                    rows.push(row(Some(species), Some(si_text(dimension)), Some(dimension), &description));
+                }
+            }
             rows
         }
     }
 }
 
+/// What an error column is measured in: species or pair, kind of table and dimension, each once.
+fn compared(column: &str, errors: &[ErrorRow], plan: &Plan) -> Vec<(String, String, Dimension)> {
+    let mut found = Vec::new();
+    for row in errors {
+        let Some(field) = dimension_of(&row.unit) else { continue };
+        let Some(output) = plan.outputs.get(usize::from(row.output)) else { continue };
+        let dimension = match column {
+            "l1" => integrated(plan, output.kind, field, 1),
+            "l2" | "noise" => integrated(plan, output.kind, field, 2),
+            _ => field,
+        };
+        let second = row.species_b.as_ref().map(|name| format!(", {name}")).unwrap_or_default();
+        let entry = (format!("{}{second}", row.species_a), row.kind.clone(), dimension);
+        if !found.contains(&entry) {
+            found.push(entry);
+        }
+    }
+    found
+}
+
 /// What a table holds: species or pair, its texts in the scene, its unit; each once.
-fn values_of(table: &str, plan: &Plan, record: &Record) -> Vec<(String, String, super::unit::ValueUnit)> {
+fn values_of(table: &str, plan: &Plan, record: &Record) -> Vec<(String, String, ValueUnit)> {
     let mut values = Vec::new();
     for output in plan.outputs.iter().filter(|output| Kind::from(output.kind).name() == table) {
         for quantity in &output.quantities {

@@ -23,5 +23,5 @@ pub use footer::{Footer, KEY as FOOTER_KEY, VERSION as FOOTER_VERSION};
 pub use read::is_complete;
 pub use record::{ErrorRow, Norms, Parameter, PointRow, Record, Status, Swept, SweptValue, Value};
 pub use schema::Kind;
-pub use unit::{ValueUnit, si_text, value_dimension, value_unit};
+pub use unit::{ValueUnit, integrated, si_text, value_dimension, value_unit};
 pub use writer::{Summary, Writer, WrittenFile};

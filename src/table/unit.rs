@@ -4,8 +4,8 @@
 //! converts nothing but the factor that the plan states.
 
 use crate::plan::{Output, OutputKind, Plan, Quantity};
-use crate::units::Dimension;
 use crate::units::dimension::SCALE;
+use crate::units::{Dimension, Unit};
 
 /// The unit of one value of one output: `written value = SI value / factor`.
 #[derive(Debug, Clone, PartialEq)]
@@ -80,6 +80,44 @@ pub fn value_unit(plan: &Plan, output: &Output, quantity: Quantity, n_axes: usiz
     }
 }
 
+/// Dimension of the root of the integral of `fieldʳᵒᵒᵗ` over an output of this kind, as norms take it:
+/// over the axis of a profile, over all active axes of a map.
+pub fn integrated(plan: &Plan, kind: OutputKind, field: Dimension, root: i16) -> Dimension {
+    let n_axes = match kind {
+        OutputKind::Profile | OutputKind::Covariance => 1,
+        OutputKind::Map => plan.axes.len() as i16,
+        OutputKind::Total | OutputKind::Mixing | OutputKind::Particles => 0,
+    };
+    product(field, Dimension([n_axes * SCALE / root, 0, 0, 0, 0, 0, 0]))
+}
+
+/// The dimension of a unit in text, also of those that [`si_text`] writes with broken exponents; none
+/// for what is no unit of measurement.
+pub fn dimension_of(text: &str) -> Option<Dimension> {
+    Unit::parse(text).ok().map(|unit| unit.dimension).or_else(|| of_si_text(text))
+}
+
+/// The way back from [`si_text`].
+fn of_si_text(text: &str) -> Option<Dimension> {
+    let (above, below) = text.split_once('/').unwrap_or((text, ""));
+    let below = below.strip_prefix('(').map_or(below, |rest| rest.trim_end_matches(')'));
+    if above.is_empty() {
+        return None;
+    }
+    let mut dimension = Dimension::NONE;
+    let signed = above.split_whitespace().map(|factor| (factor, 1.0));
+    for (factor, sign) in signed.chain(below.split_whitespace().map(|factor| (factor, -1.0))) {
+        if factor == "1" {
+            continue;
+        }
+        let (symbol, exponent) = factor.split_once('^').unwrap_or((factor, "1"));
+        let (idx, _) = SYMBOLS.iter().find(|(_, known)| *known == symbol)?;
+        let sixtieths = exponent.parse::<f64>().ok()? * f64::from(SCALE);
+        dimension.0[*idx] += (sign * sixtieths).round() as i16;
+    }
+    Some(dimension)
+}
+
 fn concentration_of(plan: &Plan, species_idx: usize) -> Dimension {
     match plan.species.get(species_idx) {
         Some(species) if !species.is_molar => Dimension::MASS_CONCENTRATION,
@@ -106,5 +144,19 @@ mod tests {
         assert_eq!(text(2, 0, -1, 0), "m^2/s");
         assert_eq!(text(-3, 0, -1, 1), "mol/(m^3 s)");
         assert_eq!(si_text(Dimension([SCALE / 2, 0, 0, 0, 0, 0, 0])), "m^0.5");
+    }
+
+    #[test]
+    fn a_written_unit_leads_back_to_its_dimension() {
+        for length in [-330, -150, -60, 0, 7, 30, 60, 120] {
+            for (mass, time, amount) in [(0, 0, 0), (60, -60, 0), (0, -120, 60), (-30, 60, 120)] {
+                let dimension = Dimension([length, mass, time, amount, 0, 0, 0]);
+                assert_eq!(dimension_of(&si_text(dimension)), Some(dimension), "{}", si_text(dimension));
+            }
+        }
+        assert_eq!(dimension_of("mg/L"), Some(Dimension::MASS_CONCENTRATION));
+        for text in ["byte", "UTC", "", "m^", "see column unit"] {
+            assert_eq!(dimension_of(text), None, "{text}");
+        }
     }
 }

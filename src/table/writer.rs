@@ -119,7 +119,7 @@ impl Writer {
         points.iter_mut().for_each(|row| row.write_wall = row.write_wall.or(Some(write_wall)));
         let (columns, arrays) = points::table(&points);
         tables.push(("points".to_owned(), columns.clone()));
-        let (meanings, meaning_arrays) = lists::columns(&tables, &self.plan, &self.record);
+        let (meanings, meaning_arrays) = lists::columns(&tables, errors, &self.plan, &self.record);
         done.push((
             "columns.parquet".to_owned(),
             self.whole("columns.parquet", "columns", &meanings, meaning_arrays)?,
