@@ -140,7 +140,7 @@ fn json_has_every_field_and_character_columns() {
 
 #[test]
 fn a_long_header_is_broken_at_blanks_and_stays_one_line_in_json() {
-    let message = format!("left out: {}", vec!["something (for a reason)"; 12].join(", "));
+    let message = format!("left out: {}", ["something (for a reason)"; 12].join(", "));
     let diagnostic = Diagnostic::remark(Code("L010"), message.clone());
     let shown = plain(diagnostic.clone(), "a.lam", SCENE);
     let lines: Vec<&str> = shown.trim_end().lines().collect();

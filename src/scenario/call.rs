@@ -1,6 +1,6 @@
 //! Calls: functions of the scene put in, built-in functions checked.
 
-use super::check::{Allow, Checker};
+use super::check::{Allow, Call, Checker};
 use super::expression::{Expr, Type};
 use super::scope::{BUILT_IN_FUNCTIONS, Locals, Origin};
 use crate::diagnostic::Diagnostic;
@@ -27,6 +27,7 @@ impl<'a> Checker<'a> {
         });
         let statement = match user {
             Some((Origin::Function(statement), _)) => Some(statement),
+            Some(_) if self.scope.is_doubtful(name) => return None,
             Some((origin, defined)) => {
                 let what = origin.describe();
                 self.report(
@@ -72,18 +73,27 @@ impl<'a> Checker<'a> {
         if !self.has_arguments(name, name_span, statement.parameters.len(), values.len()) {
             return None;
         }
-        if self.call_stack.contains(name) {
+        if let Some(first) = self.call_stack.iter().position(|call| call.function == *name) {
+            let mut message = Diagnostic::error(D006, format!("function `{name}` calls itself"));
+            let links = &self.call_stack[first..];
+            message = if links.len() == 1 {
+                message.at(name_span, "called from its own body")
+            } else {
+                message.at(name_span, format!("calls `{name}` again"))
+            };
+            message = message.also(statement.name.span, "defined here");
+            for link in &links[1..] {
+                message = message.also(link.name_span, format!("calls `{}`", link.function));
+            }
             self.report(
-                Diagnostic::error(D006, format!("function `{name}` calls itself"))
-                    .at(name_span, "called from its own body")
-                    .also(statement.name.span, "defined here")
+                message
                     .found("a function that calls itself")
                     .expected("a function whose body ends in built-in functions"),
             );
             return None;
         }
         let locals: Locals = statement.parameters.iter().map(|p| p.value.clone()).zip(values).collect();
-        self.call_stack.push(name.clone());
+        self.call_stack.push(Call { function: name.clone(), name_span, span });
         let body = self.check_with(&statement.body, allow, &locals);
         self.call_stack.pop();
         body.map(|body| Expr { span, ..body })

@@ -26,6 +26,14 @@ impl Allow {
     pub(super) const REFERENCE: Self = Self { position: true, time: true, species: false };
 }
 
+/// A function being put in.
+pub(super) struct Call {
+    pub function: String,
+    /// Where the call names it, and the whole call.
+    pub name_span: Span,
+    pub span: Span,
+}
+
 /// The state of checking a scene: names, messages, and the functions being put in.
 pub(super) struct Checker<'a> {
     pub scope: Scope<'a>,
@@ -34,7 +42,7 @@ pub(super) struct Checker<'a> {
     pub axes: Vec<(String, usize)>,
     /// Concentration dimension of each species, as far as known.
     pub species_dimensions: Vec<Option<Dimension>>,
-    pub(super) call_stack: Vec<String>,
+    pub(super) call_stack: Vec<Call>,
     /// Constants whose values are being worked out, each for the one before it.
     pub(super) running: Vec<String>,
 }
@@ -87,9 +95,15 @@ impl<'a> Checker<'a> {
     /// Bounds the size and refuses constants that are no finite numbers.
     fn finish(&mut self, expr: Expr) -> Option<Expr> {
         if expr.size > MAX_EXPRESSION_SIZE {
+            let message =
+                Diagnostic::error(D008, "this expression is too large once its functions are put in");
+            // The body is right by itself: what grows is the call of it.
+            let message = match self.call_stack.first() {
+                Some(call) => message.at(call.span, "this call").also(expr.span, "grown too large here"),
+                None => message.at(expr.span, "grown too large here"),
+            };
             self.report(
-                Diagnostic::error(D008, "this expression is too large once its functions are put in")
-                    .at(expr.span, "grown too large here")
+                message
                     .found(format!("{} operations", expr.size))
                     .expected(format!("at most {MAX_EXPRESSION_SIZE} operations"))
                     .help("each use of a function's parameter repeats its whole argument: use it less often"),
@@ -156,6 +170,9 @@ impl<'a> Checker<'a> {
         if is_allowed {
             return Some(Expr::leaf(node, dimension, span));
         }
+        if self.scope.is_doubtful(text) {
+            return None;
+        }
         self.report(
             Diagnostic::error(D005, format!("`{text}` cannot be used here"))
                 .at(span, format!("{what}, which is not fixed here"))
@@ -166,7 +183,11 @@ impl<'a> Checker<'a> {
     }
 
     fn named(&mut self, text: &str, span: Span, allow: Allow) -> Option<Expr> {
+        let is_doubtful = self.scope.is_doubtful(text);
         let Some(entry) = self.scope.get_mut(text) else {
+            if is_doubtful {
+                return None;
+            }
             if BUILT_IN_FUNCTIONS.contains(&text) {
                 self.report(
                     Diagnostic::error(D005, format!("`{text}` cannot be used here"))
@@ -189,6 +210,7 @@ impl<'a> Checker<'a> {
                 let dimension = self.species_dimensions[idx].unwrap_or(Dimension::MOLAR_CONCENTRATION);
                 Some(Expr::leaf(Node::Species(idx), dimension, span))
             }
+            _ if is_doubtful => None,
             origin => {
                 let defined = entry.span;
                 let what = origin.describe();

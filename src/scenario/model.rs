@@ -116,6 +116,9 @@ pub(super) fn species_index(checker: &mut Checker<'_>, name: &tree::Name) -> Opt
         return Some(idx);
     }
     let (what, defined) = (entry.origin.describe(), entry.span);
+    if checker.scope.is_doubtful(&name.value) {
+        return None;
+    }
     checker.report(
         Diagnostic::error(D005, format!("`{}` is not a species", name.value))
             .at(name.span, format!("this is {what}"))

@@ -211,7 +211,7 @@ fn item_solution<'a>(
         let what = format!("argument `{}` of `{}`", argument.name, item.name);
         let (low, high) = argument.range;
         let value = checker.slot(written, &what, dimension).and_then(|value| {
-            let rule = format!("{} ({} to {} in SI)", argument.doc, precise(low), precise(high));
+            let rule = format!("{} ({})", argument.doc, allowed(low, high));
             let is_fine = (low..=high).contains(&value.value);
             checker.require(is_fine, &what, format!("{} (SI)", precise(value.value)), &rule, value.span)?;
             Some(value.value)
@@ -242,6 +242,16 @@ fn item_solution<'a>(
         return None;
     }
     Some(Solution::Catalogue { name: item.name, arguments: values })
+}
+
+/// A range of SI values in words; the largest number stands for no bound.
+fn allowed(low: f64, high: f64) -> String {
+    match (low > -f64::MAX, high < f64::MAX) {
+        (true, true) => format!("{} to {} in SI", precise(low), precise(high)),
+        (true, false) => format!("{} or more in SI", precise(low)),
+        (false, true) => format!("{} or less in SI", precise(high)),
+        (false, false) => "any number".to_owned(),
+    }
 }
 
 fn signature(item: &Item) -> String {

@@ -65,6 +65,9 @@ impl Entry<'_> {
 #[derive(Debug, Default)]
 pub(super) struct Scope<'a> {
     entries: BTreeMap<String, Entry<'a>>,
+    /// Names with a second definition, or a meaning of the language: what does not fit the first one
+    /// may fit the other.
+    doubtful: BTreeSet<String>,
     /// Undefined names and the places that use them; reported once each.
     undefined: BTreeMap<String, BTreeSet<Span>>,
 }
@@ -87,6 +90,7 @@ impl<'a> Scope<'a> {
     ) {
         let text = name.value.as_str();
         if let Some(meaning) = reserved_meaning(text, axes) {
+            self.doubtful.insert(text.to_owned());
             diagnostics.push(
                 Diagnostic::error(D003, format!("`{text}` already means {meaning}"))
                     .at(name.span, "choose another name")
@@ -97,6 +101,7 @@ impl<'a> Scope<'a> {
         }
         if let Some(known) = self.entries.get(text) {
             // Kinds of statements are gathered one after another: the text decides which came first.
+            self.doubtful.insert(text.to_owned());
             let mut places = [(known.span, known.origin), (name.span, origin)];
             places.sort_by_key(|(span, _)| span.start);
             let [first, second] = places;
@@ -116,6 +121,11 @@ impl<'a> Scope<'a> {
 
     pub(super) fn get_mut(&mut self, name: &str) -> Option<&mut Entry<'a>> {
         self.entries.get_mut(name)
+    }
+
+    /// Whether a name has two meanings, which has been reported.
+    pub(super) fn is_doubtful(&self, name: &str) -> bool {
+        self.doubtful.contains(name)
     }
 
     pub(super) fn get(&self, name: &str) -> Option<&Entry<'a>> {

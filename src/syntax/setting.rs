@@ -113,7 +113,7 @@ mod tests {
         // What cannot be read has its place in the setting, too.
         for text in ["v=2 +", "v=", "v=)", "v=2 3", "=2", "v=ü", "v=2 kk/"] {
             let (value, diagnostics) = parse_setting(FileId(0), text);
-            assert!(value.is_none() == !diagnostics.is_empty(), "{text}: {diagnostics:?}");
+            assert!(value.is_none() != diagnostics.is_empty(), "{text}: {diagnostics:?}");
             for label in diagnostics.iter().flat_map(|diagnostic| &diagnostic.labels) {
                 assert!(
                     label.span.end as usize <= text.len() && label.span.start <= label.span.end,
