@@ -80,15 +80,16 @@ pub fn lettering(size: f64, horizontal: HPos, vertical: VPos) -> Lettering {
 /// Draws a panel into its box.
 pub fn draw(canvas: &mut Canvas, panel: &Panel, outer: Frame) {
     let color_bar = if panel.heat.is_some() { 58.0 } else { 0.0 };
+    let y_ticks = panel.y.ticks(5);
     let inner = Frame {
-        left: outer.left + 62.0,
+        left: outer.left + left_margin(&y_ticks),
         top: outer.top + 28.0,
         right: outer.right - 14.0 - color_bar,
         bottom: outer.bottom - 44.0,
     };
     let title = Lettering { size: 13.0, ..lettering(13.0, HPos::Left, VPos::Bottom) };
     canvas.letters(&panel.title, (inner.left, inner.top - 4.0), title);
-    let ticks = Ticks { x: x_ticks(panel, inner), y: panel.y.ticks(5) };
+    let ticks = Ticks { x: x_ticks(panel, inner), y: y_ticks };
     grid(canvas, panel, &ticks, inner);
     if let Some(heat) = &panel.heat {
         heat.draw(canvas, inner);
@@ -99,6 +100,16 @@ pub fn draw(canvas: &mut Canvas, panel: &Panel, outer: Frame) {
     axes(canvas, panel, &ticks, inner);
     labels(canvas, panel, inner, outer);
     key(canvas, panel, inner);
+}
+
+/// Room for the axis label and the widest text of the ticks; the same in all panels unless one needs more.
+fn left_margin(ticks: &[(f64, String)]) -> f64 {
+    let is_narrow = |c: char| matches!(c, '.' | '·' | '⁻' | '¹' | '²' | '³' | '⁰' | '⁴'..='⁹');
+    let width = |text: &String| {
+        let n_narrow = text.chars().filter(|&c| is_narrow(c)).count();
+        text_width(text, SMALL) - 0.22 * SMALL * n_narrow as f64
+    };
+    ticks.iter().map(|(_, text)| width(text) + 24.0).fold(62.0, f64::max)
 }
 
 /// Places and texts along both axes.
@@ -234,4 +245,20 @@ pub fn draw_entry(canvas: &mut Canvas, entry: &KeyEntry, at: (f64, f64)) -> f64 
 pub fn entry_width(entry: &KeyEntry) -> f64 {
     let sample = if entry.look == Look::Dots { 14.0 } else { 29.0 };
     sample + text_width(&entry.text, SMALL) + 16.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wide_labels_have_room_beside_the_name_of_the_axis() {
+        let margin = |text: &str| left_margin(&[(1.0, "0".to_owned()), (2.0, text.to_owned())]);
+        assert_eq!((margin("0.05"), margin("1.5·10⁶")), (62.0, 62.0));
+        for text in ["123.456", "1.4995·10⁻⁷", "−0.29985"] {
+            // Two thirds of what a common face needs for each character, beside the 16 of the name.
+            let needed = text.chars().count() as f64 * SMALL * 0.37 + 6.0 + 16.0;
+            assert!(margin(text) > 62.0 && margin(text) > needed, "{text}: {}", margin(text));
+        }
+    }
 }

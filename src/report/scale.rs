@@ -14,6 +14,13 @@ pub enum Spacing {
 const LARGEST: f64 = 1e300;
 const SMALLEST: f64 = 1e-290;
 
+/// Values that differ by less than this part of themselves are one value and its rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// Least part of the largest value that a linear axis covers: with less, its labels differ only in digits
+/// that nobody reads, and have no room beside it.
+const LEAST_SPAN: f64 = 1e-3;
+
 /// A range of values with its spacing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scale {
@@ -42,7 +49,11 @@ impl Scale {
     }
 
     fn padded(low: f64, high: f64) -> Self {
-        let span = if high > low { high - low } else { high.abs() };
+        let size = low.abs().max(high.abs());
+        let is_one_value = high - low <= ROUNDING * size;
+        let span = if is_one_value { size } else { (high - low).max(LEAST_SPAN * size) };
+        let missing = if is_one_value { 0.0 } else { 0.5 * (span - (high - low)) };
+        let (low, high) = (low - missing, high + missing);
         // Noise below zero of less than a fiftieth of the range does not move the end from zero by more.
         let low = if low >= 0.0 && low < 0.5 * high { 0.0 } else { low - 0.06 * span };
         let high = if high <= 0.0 && high > 0.5 * low { 0.0 } else { high + 0.06 * span };
@@ -100,7 +111,7 @@ fn number(value: f64, step_exponent: i32, largest: f64) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }
-    if largest >= 1e5 || step_exponent < -4 {
+    if largest >= 1e5 || step_exponent < -4 && largest < 1e-2 {
         let exponent = log10(value.abs()).floor() as i32;
         let digits = (exponent - step_exponent).clamp(0, 6) as usize;
         let mantissa = format!("{:.digits$}", value / power_of_ten(exponent));
@@ -176,6 +187,31 @@ mod tests {
 
     fn zero(text: &str) -> String {
         if text == "0.00" { "0".to_owned() } else { text.to_owned() }
+    }
+
+    /// Noise of rounding is a flat line on the axis of its value; a drift of 1e-5 is seen as a small one.
+    #[test]
+    fn rounding_does_not_fill_a_panel() {
+        for value in [1.5e-7, 0.3, -0.3, 123.4, 7.5e8] {
+            let exact = Scale::covering([value].into_iter(), Spacing::Linear);
+            for (change, largest_share) in [(2e-16, 1e-14), (1e-10, 1e-8), (1e-5, 0.02)] {
+                let values = [value, value * (1.0 + change), value * (1.0 - change)];
+                let scale = Scale::covering(values.into_iter(), Spacing::Linear);
+                let places = values.map(|value| scale.fraction(value));
+                let share = (places[1] - places[2]).abs();
+                assert!(share <= largest_share, "{value}, {change}: {share} of the panel");
+                assert!(places.iter().all(|place| (0.01..0.99).contains(place)), "{places:?}");
+                let texts: Vec<_> = scale.ticks(5).into_iter().map(|(_, text)| text).collect();
+                let is_distinct = texts.windows(2).all(|pair| pair[0] != pair[1]);
+                let is_short = texts.iter().all(|text| text.chars().count() <= 11);
+                assert!(texts.len() >= 3 && is_distinct && is_short, "{texts:?}");
+                if change < ROUNDING {
+                    assert!((scale.low / exact.low - 1.0).abs() < 1e-8, "{scale:?} {exact:?}");
+                }
+            }
+        }
+        let wide = Scale::covering([1.0, 3.0].into_iter(), Spacing::Linear);
+        assert_eq!((wide.low, wide.high), (0.0, 3.12), "wider ranges are what they were");
     }
 
     #[test]
