@@ -7,10 +7,13 @@ use super::Settings;
 use super::check::{Allow, Checker};
 use super::expression::Type;
 use super::scope::Origin;
-use crate::diagnostic::codes::{P001, U104};
+use crate::diagnostic::codes::{P001, S010, U104};
 use crate::diagnostic::{Diagnostic, did_you_mean};
 use crate::source::{Sources, Span};
 use crate::syntax::tree::{self, ExprKind, StatementKind, UnaryOperator};
+
+/// Each setting is a source of its own, and sources are counted in 16 bits.
+const MAX_SETTINGS: usize = 10_000;
 
 /// `--set name=value`: each is a parameter with a source of its own, `name=value` as it was typed.
 pub(super) fn read_settings(
@@ -27,6 +30,15 @@ pub(super) fn read_settings(
             _ => None,
         })
         .collect();
+    if settings.set.len() > MAX_SETTINGS {
+        diagnostics.push(
+            Diagnostic::error(S010, "there are too many settings")
+                .at(Span::new(file.file, 0, 0), "for this scene")
+                .found(format!("{} settings", settings.set.len()))
+                .expected(format!("at most {MAX_SETTINGS}")),
+        );
+        return Vec::new();
+    }
     let mut overrides = Vec::new();
     for (name, value) in &settings.set {
         let text = format!("{name}={value}");
@@ -110,5 +122,22 @@ pub(super) fn unit_as_written(value: &tree::Expr) -> Option<String> {
             unit_as_written(operand)
         }
         _ => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::source::FileId;
+
+    #[test]
+    fn any_number_of_settings_is_answered() {
+        let many = Settings { set: vec![("a".to_owned(), "1".to_owned()); 70_000], seed: None };
+        let text = "lamella 1\nparam a = 1\n";
+        let (file, _) = crate::syntax::parse(FileId(0), text);
+        let mut sources = Sources::single("a.lam", text);
+        let (scenario, diagnostics) = crate::scenario::resolve(&file, &mut sources, &many, false);
+        assert!(scenario.is_none());
+        assert!(diagnostics.iter().any(|diagnostic| diagnostic.code == S010));
     }
 }

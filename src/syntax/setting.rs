@@ -14,10 +14,13 @@ const BEFORE: &str = "lamella 1\nlet ";
 /// The value of `name=value`; no text gives a panic. All places lie in `text`.
 pub fn parse_setting(file: FileId, text: &str) -> (Option<Expr>, Vec<Diagnostic>) {
     // A second line would be a statement of its own, and nobody would read it.
-    if let Some(start) = text.find(['\n', '\r']) {
-        let rest = text[start..].trim();
-        let place = Span::new(file, start, text.len());
-        return (None, vec![more_than_a_value(place, rest)]);
+    let text = text.trim_end();
+    if let Some(line_end) = text.find(['\n', '\r']) {
+        let rest = text[line_end..].trim_start();
+        let first_line = rest.lines().next().unwrap_or(rest);
+        let start = text.len() - rest.len();
+        let place = Span::new(file, start, start + first_line.len());
+        return (None, vec![more_than_a_value(place, first_line)]);
     }
     let (parsed, mut diagnostics) = parse(file, &format!("{BEFORE}{text}\n"));
     let shift = |span: &mut Span| {
@@ -103,13 +106,14 @@ mod tests {
     #[test]
     fn a_setting_is_one_value_on_one_line() {
         for (text, place) in
-            [("v=2\n7", "\n7"), ("v=2\rlet", "\rlet"), ("v=(1 +\n2)", "\n2)"), ("v=2 \"speed\"", "\"speed\"")]
+            [("v=2\n7", "7"), ("v=2\rlet", "let"), ("v=(1 +\n 2)\n3", "2)"), ("v=2 \"speed\"", "\"speed\"")]
         {
             let (value, diagnostics) = parse_setting(FileId(0), text);
             assert!(value.is_none() && diagnostics.len() == 1, "{text}: {diagnostics:?}");
             let span = diagnostics[0].primary_span().expect("a place");
             assert_eq!(&text[span.range()], place);
         }
+        assert!(parse_setting(FileId(0), "v=2 \n").0.is_some());
         // What cannot be read has its place in the setting, too.
         for text in ["v=2 +", "v=", "v=)", "v=2 3", "=2", "v=ü", "v=2 kk/"] {
             let (value, diagnostics) = parse_setting(FileId(0), text);

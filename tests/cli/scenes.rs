@@ -118,7 +118,7 @@ fn messages_about_settings_show_them_as_typed() {
     plan("v=v").says("error[D006]").says("--set:1:3").says("v=v");
     plan("v=2 cm/s +").says("--set:1:").says("v=2 cm/s +");
     // A second line would never be read.
-    plan("v=2 cm/s\nseed 7").says("error[S001]").says("--set:1:9");
+    plan("v=2 cm/s\nseed 7").says("error[S001]").says("--set:2:1");
 }
 
 #[test]
