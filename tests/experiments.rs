@@ -28,6 +28,7 @@ fn compile(text: &str, set: &[(&str, &str)], seed: u64) -> Compiled {
     let settings = Settings {
         set: set.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect(),
         seed: Some(seed),
+        ..Settings::default()
     };
     let checked = lamella::check(Sources::single("scene.lam", text), &settings, &Options::default());
     checked.compiled.unwrap_or_else(|| panic!("no plan: {:#?}", checked.diagnostics))

@@ -15,6 +15,7 @@ const LAYERS: &[&[&str]] = &[
     &["table"],
     &["measure"],
     &["report"],
+    &["sweep"],
 ];
 
 /// Functions of `f64` that the standard library takes from the system, whose last bit therefore

@@ -44,7 +44,7 @@ enum Emit {
 }
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
-    let settings = Settings { set: arguments.set.clone(), seed: arguments.seed };
+    let settings = Settings { set: arguments.set.clone(), seed: arguments.seed, ..Settings::default() };
     let checked = load::load(&arguments.file, &settings, arguments.no_passes)?;
     terminal.diagnostics(&checked.diagnostics, &checked.sources);
     if let Some(text) = product(arguments, &checked) {

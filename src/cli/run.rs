@@ -64,7 +64,7 @@ fn scene_name(file: &Path) -> String {
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
     let interrupt = Interrupt::listen();
     let begin = Instant::now();
-    let settings = Settings { set: arguments.set.clone(), seed: arguments.seed };
+    let settings = Settings { set: arguments.set.clone(), seed: arguments.seed, ..Settings::default() };
     let mut checked = load::load(&arguments.file, &settings, arguments.no_passes)?;
     terminal.diagnostics(&checked.diagnostics, &checked.sources);
     let (Some(compiled), Some(scenario)) = (checked.compiled.take(), checked.scenario.take()) else {

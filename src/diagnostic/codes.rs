@@ -36,7 +36,7 @@ macro_rules! codes {
 }
 
 // Families: S syntax, D names and definitions, U units and dimensions, M the model as a whole,
-// N numerical limits, L left out, F files and settings, R the run.
+// W sweeps, N numerical limits, L left out, F files and settings, R the run.
 codes! {
     S001 "the text does not fit the grammar here",
     S002 "a line begins with a word that begins no statement",
@@ -74,6 +74,9 @@ codes! {
     D008 "an expression is too large",
     D009 "a value of the wrong shape",
     D010 "a name is never used",
+    W001 "a sweep asks for what there is not",
+    W002 "an axis or a value of a sweep stands twice",
+    W003 "zipped axes of different length",
     U101 "values of different dimensions are combined",
     U102 "a function needs a plain number",
     U103 "a plain number is needed",

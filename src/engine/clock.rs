@@ -17,15 +17,15 @@ impl Clock {
     pub fn start() -> Self {
         Self {
             start: Instant::now(),
-            cpu_start: process_time(),
+            cpu_start: processor_time(),
             away: Duration::ZERO,
             cpu_away: Duration::ZERO,
         }
     }
 
-    /// Does something that is not counted: neither its wall time nor what the process computes meanwhile.
+    /// Does something that is not counted: neither its wall time nor what is computed meanwhile.
     pub fn away<T>(&mut self, work: impl FnOnce() -> T) -> T {
-        let (start, cpu_start) = (Instant::now(), process_time());
+        let (start, cpu_start) = (Instant::now(), processor_time());
         let result = work();
         self.away += start.elapsed();
         self.cpu_away += since(cpu_start).unwrap_or_default();
@@ -37,27 +37,30 @@ impl Clock {
         self.start.elapsed().saturating_sub(self.away).as_secs_f64()
     }
 
-    /// Processor seconds of all threads of the process; wall seconds where the system does not tell.
+    /// Processor seconds; wall seconds where the system does not tell.
     pub fn cpu(&self) -> f64 {
         since(self.cpu_start)
             .map_or_else(|| self.wall(), |cpu| cpu.saturating_sub(self.cpu_away).as_secs_f64())
     }
 }
 
-/// Processor time of the process since an earlier reading.
+/// Processor time since an earlier reading.
 fn since(start: Option<Duration>) -> Option<Duration> {
-    Some(process_time()?.saturating_sub(start?))
+    Some(processor_time()?.saturating_sub(start?))
 }
 
-/// User and system time of all threads of the process.
+/// User and system time: of this thread if the engine has no other, so that runs side by side do not
+/// count each other, and of all threads of the process if it has.
 #[cfg(unix)]
-fn process_time() -> Option<Duration> {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+fn processor_time() -> Option<Duration> {
+    use rustix::time::{ClockId, clock_gettime};
+    let is_alone = rayon::current_num_threads() == 1;
+    let time = clock_gettime(if is_alone { ClockId::ThreadCPUTime } else { ClockId::ProcessCPUTime });
     Some(Duration::new(u64::try_from(time.tv_sec).ok()?, u32::try_from(time.tv_nsec).ok()?))
 }
 
 #[cfg(not(unix))]
-fn process_time() -> Option<Duration> {
+fn processor_time() -> Option<Duration> {
     None
 }
 
@@ -67,7 +70,7 @@ mod tests {
 
     /// Computes until the process has used that much.
     fn compute(wanted: Duration) {
-        let start = process_time();
+        let start = processor_time();
         while since(start) < Some(wanted) {
             std::hint::black_box((0..1000).map(f64::from).sum::<f64>());
         }

@@ -33,6 +33,8 @@ pub(super) struct Statements<'a> {
     pub outputs: Vec<(Span, &'a tree::Output)>,
     pub references: Vec<(Span, &'a tree::Reference)>,
     pub measures: Vec<(Span, &'a tree::Measure)>,
+    pub sweeps: Vec<(Span, &'a tree::Sweep)>,
+    pub reports: Vec<(Span, &'a tree::Report)>,
 }
 
 /// Resolves a scene: everything that can be wrong is reported together.
@@ -47,8 +49,11 @@ pub fn resolve(
     has_syntax_errors: bool,
 ) -> (Option<Scenario>, Vec<Diagnostic>) {
     let mut diagnostics = Vec::new();
-    let overrides = read_settings(file, sources, settings, &mut diagnostics);
-    let statements = gather(file, &mut diagnostics);
+    let mut overrides = read_settings(file, sources, settings, &mut diagnostics);
+    let mut statements = gather(file, &mut diagnostics);
+    let of_point = super::point::Replaced::new(&statements, &settings.point);
+    of_point.replace(&mut statements);
+    overrides.extend(of_point.parameters.iter().cloned());
     let mut checker = Checker {
         scope: Scope::default(),
         diagnostics,
@@ -133,6 +138,10 @@ fn gather<'a>(file: &'a tree::File, diagnostics: &mut Vec<Diagnostic>) -> Statem
             StatementKind::Output(s) => all.outputs.push((span, s)),
             StatementKind::Reference(s) => all.references.push((span, s)),
             StatementKind::Measure(s) => all.measures.push((span, s)),
+            StatementKind::Sweep(s) => all.sweeps.push((span, s)),
+            StatementKind::Report(s) => all.reports.push((span, s)),
+            // What a used file says has been put in by the caller.
+            StatementKind::Use(_) => {}
         }
     }
     all
@@ -226,7 +235,14 @@ fn build<'a>(
     let (references, are_references_right) = super::reference::references(checker, statements, &outputs);
     let (measures, are_measures_right) =
         super::measure::measures(checker, statements, &outputs, &references, duration);
-    if !(are_outputs_right && are_references_right && are_measures_right) {
+    let (sweeps, are_sweeps_right) = super::sweep::sweeps(checker, statements, &parameters, &measures);
+    let (reports, are_reports_right) = match are_sweeps_right && !has_syntax_errors {
+        true => super::sweep::reports(checker, statements, &measures, &sweeps),
+        // A report of a sweep that is not known would only repeat its mistakes.
+        false => (Vec::new(), true),
+    };
+    let is_analysis_right = are_measures_right && are_sweeps_right && are_reports_right;
+    if !(are_outputs_right && are_references_right && is_analysis_right) {
         return None;
     }
     Some(Scenario {
@@ -251,6 +267,8 @@ fn build<'a>(
         outputs,
         references,
         measures,
+        sweeps,
+        reports,
     })
 }
 

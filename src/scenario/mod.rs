@@ -7,18 +7,21 @@ mod call;
 mod check;
 mod choice;
 mod collect;
+pub mod condition;
 pub mod expression;
 mod geometry;
 mod measure;
 mod model;
 mod observe;
 mod places;
+mod point;
 mod quantity;
 mod reactions;
 mod reference;
 mod scope;
 mod settings;
 mod slot;
+pub mod sweep;
 mod zones;
 
 use crate::source::{Span, Spanned};
@@ -36,8 +39,10 @@ pub use places::SAME_TIME;
 pub struct Settings {
     /// `--set name=value`, in order.
     pub set: Vec<(String, String)>,
-    /// `--seed`
+    /// `--seed`, or the seed of a point and replicate.
     pub seed: Option<u64>,
+    /// What a point of a sweep sets: these expressions stand in place of the scene's own.
+    pub point: Vec<(sweep::Target, crate::syntax::tree::Expr)>,
 }
 
 /// A whole scene, resolved.
@@ -64,6 +69,8 @@ pub struct Scenario {
     pub outputs: Vec<Output>,
     pub references: Vec<Reference>,
     pub measures: Vec<Measure>,
+    pub sweeps: Vec<sweep::Sweep>,
+    pub reports: Vec<sweep::Report>,
 }
 
 /// A parameter as it was set, for the record of the run.

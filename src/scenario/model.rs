@@ -14,7 +14,7 @@ use crate::syntax::tree;
 use crate::units::Dimension;
 
 /// Particles that a plan may name at all; memory is checked against the machine later.
-const MAX_PARTICLES: f64 = 1e11;
+pub(super) const MAX_PARTICLES: f64 = 1e11;
 
 /// The species so far; some may be wrong while the rest is still checked.
 pub(super) struct SpeciesList {

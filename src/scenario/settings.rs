@@ -132,7 +132,7 @@ mod tests {
 
     #[test]
     fn any_number_of_settings_is_answered() {
-        let many = Settings { set: vec![("a".to_owned(), "1".to_owned()); 70_000], seed: None };
+        let many = Settings { set: vec![("a".to_owned(), "1".to_owned()); 70_000], ..Settings::default() };
         let text = "lamella 1\nparam a = 1\n";
         let (file, _) = crate::syntax::parse(FileId(0), text);
         let mut sources = Sources::single("a.lam", text);

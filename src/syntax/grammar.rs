@@ -33,6 +33,9 @@ pub fn rule_of(keyword: &str) -> Option<Rule> {
         "output" => Rule::output,
         "reference" => Rule::reference,
         "measure" => Rule::measure,
+        "use" => Rule::r#use,
+        "sweep" => Rule::sweep,
+        "report" => Rule::report,
         _ => return None,
     })
 }

@@ -4,7 +4,7 @@
 //! It deliberately looks at no grammar: a broken statement must not change where the next begins.
 
 use super::tree::{Token, TokenKind};
-use super::words::{RESERVED_WORDS, is_statement_keyword};
+use super::words::{BODY_KEYWORDS, LATER_KEYWORDS, RESERVED_WORDS, is_statement_keyword};
 
 /// The tokens of one statement without blanks around it: from its first word to its last token.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -113,10 +113,11 @@ impl<'t> Splitter<'t> {
         }
     }
 
-    /// The closing brace of a later version's statement: its body may hold what looks like statements.
+    /// The closing brace of a statement whose body may hold what looks like statements.
     fn body_to_skip(&self, idx: usize, closing: &[Option<u32>]) -> Option<usize> {
         let keyword = self.lexed.slice(self.current.as_ref()?.first);
-        let is_body = self.lexed.slice(idx) == "{" && super::words::LATER_KEYWORDS.contains(&keyword);
+        let has_body = LATER_KEYWORDS.contains(&keyword) || BODY_KEYWORDS.contains(&keyword);
+        let is_body = has_body && self.lexed.slice(idx) == "{";
         is_body.then(|| closing[idx].map(|close| close as usize)).flatten()
     }
 

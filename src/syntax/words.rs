@@ -26,16 +26,21 @@ pub const STATEMENT_KEYWORDS: &[&str] = &[
     "output",
     "reference",
     "measure",
+    "use",
+    "sweep",
+    "report",
 ];
 
 /// First words that the language description knows and this version does not run yet.
-pub const LATER_KEYWORDS: &[&str] =
-    &["medium", "source", "kernel", "use", "sweep", "report", "data", "chemistry"];
+pub const LATER_KEYWORDS: &[&str] = &["medium", "source", "kernel", "data", "chemistry"];
+
+/// Statements whose body in braces may hold what looks like statements.
+pub const BODY_KEYWORDS: &[&str] = &["sweep"];
 
 /// Words that can be neither names nor units, wherever they stand.
 pub const RESERVED_WORDS: &[&str] = &[
     "if", "then", "else", "and", "or", "not", "in", "at", "every", "along", "on", "over", "for", "until",
-    "of", "during",
+    "of", "during", "by", "when",
 ];
 
 /// Whether a word begins a statement of this or a later version.
@@ -54,6 +59,11 @@ pub fn clause_words(keyword: &str) -> &'static [&'static str] {
         "output" => &["at", "every", "along", "on", "in"],
         "reference" => &["for"],
         "measure" => &["over", "at"],
+        "use" => &["as"],
+        "sweep" => {
+            &["of", "replicates", "until", "seed", "common_random_numbers", "skip", "expect", "zip", "factor"]
+        }
+        "report" => &["against", "by"],
         _ => &[],
     }
 }

@@ -7,6 +7,7 @@
 mod bins;
 mod failure;
 mod footer;
+mod gather;
 mod lists;
 mod points;
 pub mod read;
@@ -20,6 +21,8 @@ mod writer;
 pub use bins::{Grid, centre};
 pub use failure::TableError;
 pub use footer::{Footer, KEY as FOOTER_KEY, VERSION as FOOTER_VERSION};
+pub use gather::Gatherer;
+pub use points::Shape;
 pub use read::is_complete;
 pub use record::{ErrorRow, Norms, Parameter, PointRow, Record, Status, Swept, SweptValue, Value};
 pub use schema::Kind;

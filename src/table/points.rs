@@ -2,7 +2,7 @@
 //!
 //! Owns its columns. May use `record` and `schema`. It deliberately measures nothing.
 
-use super::record::{PointRow, SweptValue};
+use super::record::{PointRow, Swept, SweptValue};
 use super::schema::{Column, Measured};
 use crate::units::Dimension;
 use arrow_array::{
@@ -11,9 +11,38 @@ use arrow_array::{
 use arrow_schema::{DataType, TimeUnit};
 use std::sync::Arc;
 
+/// The columns that the scene names: those of any row, in the order in which they first appear. A table
+/// that is written in parts has them from a first look at all rows.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Shape {
+    swept: Vec<Swept>,
+    values: Vec<(String, String)>,
+}
+
+impl Shape {
+    pub fn of<'a>(rows: impl IntoIterator<Item = &'a PointRow>) -> Self {
+        let mut shape = Self::default();
+        rows.into_iter().for_each(|row| shape.add(row));
+        shape
+    }
+
+    pub fn add(&mut self, row: &PointRow) {
+        for swept in &row.swept {
+            if !self.swept.iter().any(|known| known.name == swept.name) {
+                self.swept.push(swept.clone());
+            }
+        }
+        for value in &row.values {
+            if !self.values.iter().any(|(name, _)| *name == value.name) {
+                self.values.push((value.name.clone(), value.unit.clone()));
+            }
+        }
+    }
+}
+
 /// Columns and their values, for any number of points.
-pub fn table(rows: &[PointRow]) -> (Vec<Column>, Vec<ArrayRef>) {
-    let mut table = Table { columns: Vec::new(), arrays: Vec::new(), rows };
+pub fn table(shape: &Shape, rows: &[PointRow]) -> (Vec<Column>, Vec<ArrayRef>) {
+    let mut table = Table { columns: Vec::new(), arrays: Vec::new(), shape, rows };
     table.identity();
     table.swept();
     table.outcome();
@@ -26,6 +55,7 @@ pub fn table(rows: &[PointRow]) -> (Vec<Column>, Vec<ArrayRef>) {
 struct Table<'a> {
     columns: Vec<Column>,
     arrays: Vec<ArrayRef>,
+    shape: &'a Shape,
     rows: &'a [PointRow],
 }
 
@@ -93,9 +123,10 @@ impl Table<'_> {
     }
 
     fn swept(&mut self) {
-        let Some(first) = self.rows.first() else { return };
-        for (place, swept) in first.swept.iter().enumerate() {
-            let value = |row: &PointRow| row.swept.get(place).map(|swept| swept.value.clone());
+        for swept in &self.shape.swept {
+            let value = |row: &PointRow| {
+                row.swept.iter().find(|own| own.name == swept.name).map(|own| own.value.clone())
+            };
             let name = self.free_name(&swept.name, "swept");
             match &swept.value {
                 SweptValue::Real(_, unit) => {
@@ -114,10 +145,15 @@ impl Table<'_> {
                     let column = Column::new(&name, DataType::Int64, Measured::Unitless, "swept value");
                     self.push(column.or_null(), Arc::new(array));
                 }
-                SweptValue::Text(_) => self.text(&name, "swept value", |row| match row.swept.get(place) {
-                    Some(super::record::Swept { value: SweptValue::Text(text), .. }) => Some(text),
-                    _ => None,
-                }),
+                SweptValue::Text(_) => {
+                    let text = |row: &PointRow| match value(row) {
+                        Some(SweptValue::Text(text)) => Some(text),
+                        _ => None,
+                    };
+                    let array: StringArray = self.rows.iter().map(text).collect();
+                    let column = Column::new(&name, DataType::Utf8, Measured::Unitless, "swept value");
+                    self.push(column.or_null(), Arc::new(array));
+                }
             }
         }
     }
@@ -151,15 +187,9 @@ impl Table<'_> {
 
     /// Measures and errors: the union over the points, in the order they first appear.
     fn values(&mut self) {
-        let mut seen: Vec<(&str, &str)> = Vec::new();
-        for value in self.rows.iter().flat_map(|row| &row.values) {
-            if !seen.iter().any(|(name, _)| *name == value.name) {
-                seen.push((&value.name, &value.unit));
-            }
-        }
-        for (name, unit) in seen {
+        for (name, unit) in &self.shape.values {
             let free = self.free_name(name, "measure");
-            let of = |row: &PointRow| row.values.iter().find(|value| value.name == name)?.value;
+            let of = |row: &PointRow| row.values.iter().find(|value| value.name == *name)?.value;
             self.real(&free, Measured::Named(unit.to_owned()), "measure, or error against a reference", of);
         }
     }

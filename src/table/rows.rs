@@ -59,18 +59,27 @@ impl Layout {
     }
 }
 
+/// Point and replicate that rows belong to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Place {
+    pub point: u32,
+    pub replicate: u32,
+}
+
 /// Appends all rows of one snapshot.
 pub fn append(
     sheet: &mut Sheet,
     layout: &Layout,
     plan: &Plan,
+    place: Place,
     snapshot: &Snapshot,
 ) -> Result<(), TableError> {
     let output = &plan.outputs[snapshot.output_idx];
     check_shape(plan, output, snapshot)?;
     let grid = Grid::new(plan, output);
     for (quantity_idx, quantity) in output.quantities.iter().enumerate() {
-        let block = Block { layout, plan, grid: &grid, snapshot, quantity_idx, quantity: *quantity };
+        let quantity = *quantity;
+        let block = Block { layout, plan, grid: &grid, place, snapshot, quantity_idx, quantity };
         let n = block.n_rows();
         for start in (0..n).step_by(ROW_GROUP) {
             sheet.append(&block.batch(start..n.min(start + ROW_GROUP))?)?;
@@ -84,6 +93,7 @@ struct Block<'a> {
     layout: &'a Layout,
     plan: &'a Plan,
     grid: &'a Grid,
+    place: Place,
     snapshot: &'a Snapshot,
     quantity_idx: usize,
     quantity: Quantity,
@@ -140,8 +150,8 @@ impl Block<'_> {
 
     fn head(&self, n: usize) -> Vec<ArrayRef> {
         vec![
-            Arc::new(UInt32Array::from_value(0, n)),
-            Arc::new(UInt32Array::from_value(0, n)),
+            Arc::new(UInt32Array::from_value(self.place.point, n)),
+            Arc::new(UInt32Array::from_value(self.place.replicate, n)),
             Arc::new(Float64Array::from_value(self.snapshot.t, n)),
         ]
     }

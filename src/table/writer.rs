@@ -5,8 +5,9 @@
 
 use super::failure::TableError;
 use super::footer::Footer;
+use super::points::Shape;
 use super::record::{ErrorRow, PointRow, Record};
-use super::rows::{self, Layout};
+use super::rows::{self, Layout, Place};
 use super::schema::{self, Column, Kind};
 use super::sheet::{Draft, Finished, Sheet, is_temporary, sync_folder};
 use super::{lists, points};
@@ -20,12 +21,12 @@ use std::time::{Duration, Instant};
 /// Writes one run. Until [`Writer::finish`] returns, readers see what was there before; a writer
 /// that is dropped takes its temporary files away.
 pub struct Writer {
-    folder: PathBuf,
+    pub(super) folder: PathBuf,
     /// Held as long as the writer lives: one run per folder.
     _lock: Option<File>,
-    plan: Plan,
-    record: Record,
-    sheets: Vec<(Kind, Layout, Sheet)>,
+    pub(super) plan: Plan,
+    pub(super) record: Record,
+    pub(super) sheets: Vec<(Kind, Layout, Sheet)>,
     elapsed: Duration,
 }
 
@@ -86,7 +87,7 @@ impl Writer {
         };
         let kind = Kind::from(output.kind);
         if let Some((_, layout, sheet)) = self.sheets.iter_mut().find(|(other, ..)| *other == kind) {
-            rows::append(sheet, layout, &self.plan, snapshot)?;
+            rows::append(sheet, layout, &self.plan, Place::default(), snapshot)?;
         }
         self.elapsed += begin.elapsed();
         Ok(())
@@ -111,13 +112,10 @@ impl Writer {
             ));
             tables.push((Kind::Errors.name().to_owned(), columns));
         }
-        let texts = [
-            Draft::text(&self.folder.join("plan.yaml"), &self.record.plan_yaml)?,
-            Draft::text(&self.folder.join("scene.lam"), &self.record.scene_source)?,
-        ];
+        let texts = self.texts()?;
         let write_wall = (self.elapsed + begin.elapsed()).as_secs_f64();
         points.iter_mut().for_each(|row| row.write_wall = row.write_wall.or(Some(write_wall)));
-        let (columns, arrays) = points::table(&points);
+        let (columns, arrays) = points::table(&Shape::of(&points), &points);
         tables.push(("points".to_owned(), columns.clone()));
         let (meanings, meaning_arrays) = lists::columns(&tables, errors, &self.plan, &self.record);
         done.push((
@@ -130,8 +128,16 @@ impl Writer {
         Ok(Summary { files, write_wall: (self.elapsed + begin.elapsed()).as_secs_f64() })
     }
 
+    /// The texts that stand beside the tables.
+    pub(super) fn texts(&self) -> Result<Vec<Draft>, TableError> {
+        Ok(vec![
+            Draft::text(&self.folder.join("plan.yaml"), &self.record.plan_yaml)?,
+            Draft::text(&self.folder.join("scene.lam"), &self.record.scene_source)?,
+        ])
+    }
+
     /// A small table, finished but not yet named.
-    fn whole(
+    pub(super) fn whole(
         &self,
         name: &str,
         table: &str,
@@ -148,9 +154,9 @@ impl Writer {
         sheet.finish()
     }
 
-    fn publish(
+    pub(super) fn publish(
         &self,
-        texts: [Draft; 2],
+        texts: Vec<Draft>,
         done: Vec<(String, Finished)>,
     ) -> Result<Vec<WrittenFile>, TableError> {
         for draft in texts {
@@ -185,7 +191,7 @@ impl Writer {
         Ok(())
     }
 
-    fn part(&self, kind: Kind) -> PathBuf {
+    pub(super) fn part(&self, kind: Kind) -> PathBuf {
         self.folder.join(part_name(kind))
     }
 }
@@ -201,7 +207,7 @@ impl Drop for Writer {
     }
 }
 
-fn part_name(kind: Kind) -> String {
+pub(super) fn part_name(kind: Kind) -> String {
     format!("{}/part-0000.parquet", kind.name())
 }
 

@@ -7,6 +7,7 @@
 mod expressions;
 mod quantity;
 mod statements;
+mod sweeps;
 
 use super::climb::Built;
 use super::grammar::Rule;
@@ -73,6 +74,12 @@ impl<'i> Parts<'i> {
         Ok(spanned(self.place, &pair))
     }
 
+    /// The next part, if it is a name.
+    fn take_name(&mut self) -> Built<Option<Name>> {
+        let is_name = self.pairs.peek().is_some_and(|pair| pair.as_rule() == Rule::name);
+        is_name.then(|| self.name()).transpose()
+    }
+
     /// A rule that holds nothing but a name, such as the kind of an output.
     fn wrapped_name(&mut self, rule: Rule) -> Built<Name> {
         let pair = self.need(rule)?;
@@ -135,7 +142,7 @@ fn is_keyword(rule: Rule) -> bool {
     ) || matches!(
         rule,
         R::kw_initial | R::kw_particles | R::kw_run | R::kw_output | R::kw_reference | R::kw_measure
-    );
+    ) || matches!(rule, R::kw_use | R::kw_sweep | R::kw_report);
     let joins = matches!(
         rule,
         R::kw_zones
@@ -150,6 +157,12 @@ fn is_keyword(rule: Rule) -> bool {
     ) || matches!(
         rule,
         R::kw_along | R::kw_on | R::kw_over | R::kw_for | R::kw_if | R::kw_then | R::kw_else
+    ) || matches!(
+        rule,
+        R::kw_as | R::kw_of | R::kw_by | R::kw_until | R::kw_when | R::kw_zip | R::kw_skip
+    ) || matches!(
+        rule,
+        R::kw_expect | R::kw_factor | R::kw_against | R::kw_replicates | R::kw_common | R::less
     );
     begins || joins
 }

@@ -4,14 +4,14 @@
 //! It deliberately resolves no name; clauses in free order are counted, nothing else is checked.
 
 use super::expressions::{bare_number, operand};
-use super::{Parts, Place, span_at, spanned};
+use super::{Parts, Place, span_at, spanned, sweeps};
 use crate::diagnostic::{Diagnostic, codes};
 use crate::source::{Span, Spanned};
 use crate::syntax::climb::Built;
 use crate::syntax::grammar::Rule;
 use crate::syntax::tree::{
     Arrow, Assignment, Average, Axis, Boundary, Domain, Expr, Field, Flow, Function, Let, Measure, Output,
-    Param, Particles, Reaction, Reference, Run, Species, StatementKind, Target, Term, Times, Zone,
+    Param, Particles, Reaction, Reference, Run, Species, StatementKind, Target, Term, Times, Use, Zone,
 };
 use pest::iterators::Pair;
 
@@ -55,17 +55,20 @@ pub fn kind(mut parts: Parts, rule: Rule) -> Built<StatementKind> {
         Rule::run => S::Run(run(parts)?),
         Rule::output => S::Output(output(parts)?),
         Rule::reference => S::Reference(reference(parts)?),
-        _ => S::Measure(measure(parts)?),
+        Rule::measure => S::Measure(measure(parts)?),
+        Rule::r#use => S::Use(Use { path: parts.text()?, alias: parts.name()? }),
+        Rule::report => S::Report(sweeps::report(parts)?),
+        _ => S::Sweep(sweeps::sweep(parts)?),
     })
 }
 
 /// All following parts of one rule, each built by `build`.
-fn each<T>(parts: &mut Parts, rule: Rule, build: fn(&mut Parts) -> Built<T>) -> Built<Vec<T>> {
+pub fn each<T>(parts: &mut Parts, rule: Rule, build: fn(&mut Parts) -> Built<T>) -> Built<Vec<T>> {
     let place = parts.place;
     std::iter::from_fn(|| parts.take(rule)).map(|pair| build(&mut Parts::of(place, pair))).collect()
 }
 
-fn whole_number<T: std::str::FromStr>(parts: &mut Parts, what: &str) -> Built<Spanned<T>> {
+pub fn whole_number<T: std::str::FromStr>(parts: &mut Parts, what: &str) -> Built<Spanned<T>> {
     let pair = parts.need(Rule::bare_number)?;
     let span = span_at(parts.place, &pair);
     match pair.as_str().replace('_', "").parse() {
