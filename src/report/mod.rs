@@ -12,6 +12,11 @@ mod heat;
 mod panel;
 mod panels;
 mod scale;
+mod sweep;
 
 pub use errors::{error_rows, error_values};
 pub use figure::figure;
+pub use sweep::{
+    ExpectationOutcome, ExpectedOrder, SWEEP_FILE, SWEEP_VERSION, SweepAxis, SweepDescription,
+    SweepExpectation, SweepReplicates, SweepReport, SweepReportKind,
+};
