@@ -103,6 +103,37 @@ fn settings_of_the_command_line_are_held_to_the_same_checks() {
 }
 
 #[test]
+fn sizes_of_the_command_line_stand_in_place_of_the_scenes() {
+    let set = |list: &[(&str, &str)]| Settings {
+        set: list.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect(),
+        ..Settings::default()
+    };
+    let hash = |text: &str, list: &[(&str, &str)]| compile_with(text, &set(list), &Options::default()).hash;
+    let by_hand = edited("fluid 1_000_000", "fluid 100_000")
+        .replace("step 2 s", "step 1 s")
+        .replace("average bins 300", "average bins 200");
+    let all = [("particles", "1e5"), ("step", "1000 ms"), ("bins", "200")];
+    assert_eq!(hash(COLUMN, &all), compile(&by_hand).hash);
+    assert_ne!(hash(COLUMN, &all[..2]), compile(&by_hand).hash, "all three count");
+    // Of two the last one counts, whatever stands between them.
+    let twice = [("step", "4 s"), ("particles", "1e5"), ("bins", "200"), ("step", "1 s")];
+    assert_eq!(hash(COLUMN, &twice), compile(&by_hand).hash);
+    // A parameter of that name comes first.
+    let own = edited("param chi = 1e-3 /s", "param step = 1e-3 /s")
+        .replace("rate chi", "rate step")
+        .replace("chi = chi", "chi = step");
+    assert_eq!(hash(&own, &[("step", "2e-3 /s")]), compile(&own.replace("1e-3 /s", "2e-3 /s")).hash);
+    let code = |text: &str, name: &str, value: &str| {
+        let checked =
+            lamella::check(Sources::single("scene.lam", text), &set(&[(name, value)]), &Options::default());
+        checked.diagnostics[0].code.0
+    };
+    assert_eq!(code(COLUMN, "step", "2 m"), "U104");
+    assert_eq!(code(COLUMN, "particles", "2.5"), "M005");
+    assert_eq!(code(COLUMN, "bins", "(10, 10)"), "D009");
+}
+
+#[test]
 fn the_column_carries_one_field_in_one_zone_and_says_why() {
     let compiled = compile(COLUMN);
     assert_eq!(compiled.plan.components.len(), 1);

@@ -12,7 +12,7 @@ pub(crate) struct Arguments {
     /// Scene files; `-` is standard input
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// Set a parameter, such as v=2cm/s
+    /// Set a parameter, or particles, step, bins; such as v=2cm/s, particles=1e5
     #[arg(long, value_name = "NAME=VALUE", value_parser = load::parse_setting)]
     set: Vec<(String, String)>,
 }

@@ -20,7 +20,7 @@ pub(crate) struct Arguments {
     /// Print a station on the way from text to run instead
     #[arg(long, value_enum)]
     emit: Option<Emit>,
-    /// Set a parameter, such as v=2cm/s
+    /// Set a parameter, or particles, step, bins; such as v=2cm/s, particles=1e5
     #[arg(long, value_name = "NAME=VALUE", value_parser = load::parse_setting)]
     set: Vec<(String, String)>,
     /// Root of all random numbers, instead of the scene's

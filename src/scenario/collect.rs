@@ -49,9 +49,10 @@ pub fn resolve(
     has_syntax_errors: bool,
 ) -> (Option<Scenario>, Vec<Diagnostic>) {
     let mut diagnostics = Vec::new();
-    let mut overrides = read_settings(file, sources, settings, &mut diagnostics);
+    let given = read_settings(file, sources, settings, &mut diagnostics);
+    let mut overrides = given.params;
     let mut statements = gather(file, &mut diagnostics);
-    let of_point = super::point::Replaced::new(&statements, &settings.point);
+    let of_point = super::point::Replaced::new(&statements, given.sizes.iter().chain(&settings.point));
     of_point.replace(&mut statements);
     overrides.extend(of_point.parameters.iter().cloned());
     let mut checker = Checker {

@@ -1,4 +1,5 @@
-//! A point of a sweep: the statements of a scene with the values of the point in them.
+//! A point of a sweep: the statements of a scene with the values of the point in them. Sizes that the
+//! command line sets go the same way.
 //!
 //! Owns the replacement. May use the tree. It deliberately checks nothing: a replaced value passes the
 //! same checks as a written one, and messages show the place in the sweep.
@@ -16,7 +17,11 @@ pub(super) struct Replaced {
 }
 
 impl Replaced {
-    pub(super) fn new(statements: &Statements<'_>, point: &[(Target, Expr)]) -> Self {
+    /// Of several values for one thing the last one counts.
+    pub(super) fn new<'p>(
+        statements: &Statements<'_>,
+        point: impl IntoIterator<Item = &'p (Target, Expr)>,
+    ) -> Self {
         let mut replaced = Self { parameters: Vec::new(), particles: None, run: None, average: None };
         for (target, value) in point {
             let value = value.clone();

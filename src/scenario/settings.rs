@@ -1,12 +1,13 @@
-//! Settings of the command line: parameters with other values than the scene gives them.
+//! Settings of the command line: parameters and sizes with other values than the scene gives them.
 //!
-//! Owns `--set name=value` from its text to the parameter it replaces. May use `syntax`. It deliberately
-//! leaves ranges to the parameters themselves.
+//! Owns `--set name=value` from its text to what it replaces. May use `syntax`. It deliberately leaves
+//! ranges and dimensions to the statements that the values go to.
 
 use super::Settings;
 use super::check::{Allow, Checker};
 use super::expression::Type;
 use super::scope::Origin;
+use super::sweep::Target;
 use crate::diagnostic::codes::{P001, S010, U104};
 use crate::diagnostic::{Diagnostic, did_you_mean};
 use crate::source::{Sources, Span};
@@ -15,13 +16,31 @@ use crate::syntax::tree::{self, ExprKind, StatementKind, UnaryOperator};
 /// Each setting is a source of its own, and sources are counted in 16 bits.
 const MAX_SETTINGS: usize = 10_000;
 
-/// `--set name=value`: each is a parameter with a source of its own, `name=value` as it was typed.
+/// What the command line sets.
+#[derive(Default)]
+pub(super) struct Given {
+    pub params: Vec<tree::Param>,
+    /// Sizes: the same as what a point of a sweep sets.
+    pub sizes: Vec<(Target, tree::Expr)>,
+}
+
+/// `--set name=value`: each has a source of its own, `name=value` as it was typed.
 pub(super) fn read_settings(
     file: &tree::File,
     sources: &mut Sources,
     settings: &Settings,
     diagnostics: &mut Vec<Diagnostic>,
-) -> Vec<tree::Param> {
+) -> Given {
+    let mut given = Given::default();
+    if settings.set.len() > MAX_SETTINGS {
+        diagnostics.push(
+            Diagnostic::error(S010, "there are too many settings")
+                .at(Span::new(file.file, 0, 0), "for this scene")
+                .found(format!("{} settings", settings.set.len()))
+                .expected(format!("at most {MAX_SETTINGS}")),
+        );
+        return given;
+    }
     let params: Vec<&tree::Param> = file
         .statements
         .iter()
@@ -30,33 +49,44 @@ pub(super) fn read_settings(
             _ => None,
         })
         .collect();
-    if settings.set.len() > MAX_SETTINGS {
-        diagnostics.push(
-            Diagnostic::error(S010, "there are too many settings")
-                .at(Span::new(file.file, 0, 0), "for this scene")
-                .found(format!("{} settings", settings.set.len()))
-                .expected(format!("at most {MAX_SETTINGS}")),
-        );
-        return Vec::new();
-    }
-    let mut overrides = Vec::new();
+    let sizes = sizes(file);
     for (name, value) in &settings.set {
         let text = format!("{name}={value}");
         let id = sources.add("--set", text.clone());
         let name = name.trim();
-        let Some(param) = params.iter().find(|param| param.name.value == name) else {
+        // A parameter of that name comes first, as in a sweep.
+        let param = params.iter().find(|param| param.name.value == name);
+        let size = sizes.iter().find(|size| size.name() == name);
+        if param.is_none() && size.is_none() {
             let start = text.len() - text.trim_start().len();
             let place = Span::new(id, start, start + name.len());
-            diagnostics.push(unknown_parameter(name, place, &params, constant(file, name)));
+            diagnostics.push(unknown_setting(name, place, &params, &sizes, constant(file, name)));
             continue;
-        };
+        }
         let (value, errors) = crate::syntax::parse_setting(id, &text);
         diagnostics.extend(errors);
-        if let Some(value) = value {
-            overrides.push(tree::Param { value, ..(*param).clone() });
+        let Some(value) = value else { continue };
+        match (param, size) {
+            (Some(param), _) => given.params.push(tree::Param { value, ..(*param).clone() }),
+            (None, Some(size)) => given.sizes.push((size.clone(), value)),
+            (None, None) => {}
         }
     }
-    overrides
+    given
+}
+
+/// The sizes that the scene has a statement for.
+fn sizes(file: &tree::File) -> Vec<Target> {
+    let of = |statement: &tree::Statement| match statement.kind {
+        StatementKind::Particles(_) => Some(Target::Particles),
+        StatementKind::Run(_) => Some(Target::Step),
+        StatementKind::Average(_) => Some(Target::Bins),
+        _ => None,
+    };
+    let mut sizes: Vec<Target> = file.statements.iter().filter_map(of).collect();
+    sizes.sort();
+    sizes.dedup();
+    sizes
 }
 
 /// The `let` statement of that name.
@@ -67,18 +97,20 @@ fn constant<'a>(file: &'a tree::File, name: &str) -> Option<&'a tree::Let> {
     })
 }
 
-fn unknown_parameter(
+fn unknown_setting(
     name: &str,
     place: Span,
     params: &[&tree::Param],
+    sizes: &[Target],
     constant: Option<&tree::Let>,
 ) -> Diagnostic {
-    let names: Vec<&str> = params.iter().map(|param| param.name.value.as_str()).collect();
+    let params = params.iter().map(|param| param.name.value.as_str());
+    let names: Vec<&str> = params.chain(sizes.iter().map(Target::name)).collect();
     let mut message = Diagnostic::error(P001, format!("the scene has no parameter `{name}`"))
         .at(place, "set on the command line")
         .found(format!("`{name}`"))
         .expected(if names.is_empty() {
-            "no setting: the scene has no `param`".into()
+            "no setting: the scene has nothing that could be set".into()
         } else {
             names.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ")
         });
@@ -86,6 +118,8 @@ fn unknown_parameter(
         message = message
             .also(constant.name.span, "a constant, which is fixed")
             .help("write it as `param` instead of `let`, and it can be set");
+    } else if let Some(statement) = Target::SIZES.iter().find(|(word, _)| *word == name) {
+        message = message.help(format!("the scene has no `{}` statement that it could replace", statement.1));
     } else if let Some(candidate) = did_you_mean(name, names.iter().copied()) {
         message = message.help(format!("did you mean `{candidate}`?"));
     }

@@ -59,6 +59,10 @@ pub enum Target {
 }
 
 impl Target {
+    /// The words of the sizes, and the statements that give them.
+    pub(super) const SIZES: [(&str, &str); 3] =
+        [("particles", "particles"), ("step", "run"), ("bins", "average bins")];
+
     /// The name of its column and of its axis.
     pub fn name(&self) -> &str {
         match self {
