@@ -18,7 +18,7 @@ pub mod units;
 
 use diagnostic::{Diagnostic, any_fatal};
 use plan::compile::{Compiled, Options, compile};
-use scenario::{Scenario, Settings};
+use scenario::{Scenario, Settings, Uses};
 use source::{FileId, Sources};
 use syntax::tree;
 
@@ -27,20 +27,37 @@ use syntax::tree;
 pub struct Checked {
     /// The scene's files; settings of the command line are appended, so that messages can show them.
     pub sources: Sources,
+    /// The first file; statements of used files are not in it.
     pub file: tree::File,
-    /// Absent if the scene is wrong.
+    /// The files that it uses.
+    pub uses: Uses,
+    /// Absent if the scene is wrong. Of several used scenes it is that of the first sweep.
     pub scenario: Option<Scenario>,
     /// Absent if the scene is wrong or cannot run as asked.
     pub compiled: Option<Compiled>,
     pub diagnostics: Vec<Diagnostic>,
 }
 
+/// The scene of an alias in the first file of `sources`, as a tree: its own statements and those of the
+/// used file. Without an alias it is what [`check`] takes to a plan; a file that uses no other is
+/// itself. Mistakes are told by [`check`].
+pub fn base(file: &tree::File, sources: &Sources, alias: Option<&str>) -> tree::File {
+    Uses::read(file, sources).base(file, alias).0.into_owned()
+}
+
 /// Takes the first file of `sources` as far as it goes. Ends for every text, and never panics.
 pub fn check(mut sources: Sources, settings: &Settings, options: &Options) -> Checked {
     let (file, mut diagnostics) = syntax::parse(FileId(0), &sources.file(FileId(0)).text);
+    let uses = Uses::read(&file, &sources);
+    diagnostics.extend(uses.syntax.iter().cloned());
     let has_syntax_errors = any_fatal(&diagnostics);
-    let (scenario, more) = scenario::resolve(&file, &mut sources, settings, has_syntax_errors);
-    diagnostics.extend(more);
+    diagnostics.extend(uses.diagnostics.iter().cloned());
+    let mut scenario = None;
+    if uses.are_whole {
+        let (resolved, more) = scenario::resolve_all(&file, &uses, &mut sources, settings, has_syntax_errors);
+        diagnostics.extend(more);
+        scenario = resolved.filter(|_| !any_fatal(&diagnostics));
+    }
     let compiled = scenario.as_ref().and_then(|scenario| {
         let (compiled, more) = compile(scenario, options);
         diagnostics.extend(more);
@@ -48,5 +65,5 @@ pub fn check(mut sources: Sources, settings: &Settings, options: &Options) -> Ch
     });
     // What stops a scene comes before what it may be run with.
     diagnostics.sort_by_key(|diagnostic| !diagnostic.is_fatal());
-    Checked { sources, file, scenario, compiled, diagnostics }
+    Checked { sources, file, uses, scenario, compiled, diagnostics }
 }

@@ -59,10 +59,21 @@ pub struct SourceFile {
     pub text: String,
 }
 
+/// A file that a scene uses and that could not be had.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct RefusedFile {
+    pub name: String,
+    /// One sentence for the user.
+    pub reason: String,
+    /// Whether it lies where scenes may not look.
+    pub is_outside: bool,
+}
+
 /// All files of one scene; the first is the scene itself.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Sources {
     files: Vec<SourceFile>,
+    refused: Vec<RefusedFile>,
 }
 
 impl Sources {
@@ -81,6 +92,21 @@ impl Sources {
         let id = u16::try_from(self.files.len()).expect("number of files is bounded by the caller");
         self.files.push(SourceFile { name: name.into(), text: text.into() });
         FileId(id)
+    }
+
+    /// Notes that a file which the scene uses cannot be had, so that a message can say why.
+    pub fn refuse(&mut self, file: RefusedFile) {
+        self.refused.push(file);
+    }
+
+    /// Why a file is not among the sources.
+    pub fn refusal(&self, name: &str) -> Option<&RefusedFile> {
+        self.refused.iter().find(|file| file.name == name)
+    }
+
+    /// The file of that name.
+    pub fn find(&self, name: &str) -> Option<FileId> {
+        self.files().find(|(_, file)| file.name == name).map(|(id, _)| id)
     }
 
     pub fn file(&self, id: FileId) -> &SourceFile {

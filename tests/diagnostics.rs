@@ -3,13 +3,13 @@
 //! Each `tests/diagnostics/<phase>/<the_mistake>.lam` has its rendered messages beside it in a `.txt`.
 //! A line `# expect: U104 D001` demands these codes; a line `# set: name=value` is what `--set` would
 //! do; `# memory: 1000` is a machine of so many bytes; `# left out` asks for the note of what the run
-//! does without. `LAMELLA_BLESS=1` (`make bless`) writes the messages anew; look at the difference
-//! before you commit it.
+//! does without. Files that a scene uses stand in folders inside the phase. `LAMELLA_BLESS=1`
+//! (`make bless`) writes the messages anew; look at the difference before you commit it.
 
 use lamella::diagnostic::Diagnostic;
 use lamella::diagnostic::render::{self, Colour};
 use lamella::plan::compile::Options;
-use lamella::scenario::Settings;
+use lamella::scenario::{Settings, wanted_files};
 use lamella::source::Sources;
 use std::path::{Path, PathBuf};
 
@@ -50,7 +50,14 @@ fn check(path: &Path) -> (Vec<Diagnostic>, Sources) {
     let memory = directives(&text, "# memory:").next().map(|bytes| bytes.parse().expect("a number of bytes"));
     let options = Options { memory, ..Options::default() };
     let settings = Settings { set: set.collect(), ..Settings::default() };
-    let checked = lamella::check(Sources::single(name(path), text.clone()), &settings, &options);
+    let mut sources = Sources::single(name(path), text.clone());
+    for (name, used) in wanted_files(&name(path), &text) {
+        // What is not there is told by `check`.
+        if let Ok(text) = std::fs::read_to_string(path.with_file_name(used)) {
+            sources.add(name, text);
+        }
+    }
+    let checked = lamella::check(sources, &settings, &options);
     let mut diagnostics = checked.diagnostics;
     if directives(&text, "# left out").next().is_some() {
         diagnostics.extend(checked.compiled.as_ref().map(|compiled| compiled.left_out_note()));

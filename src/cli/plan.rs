@@ -1,15 +1,14 @@
 //! `lamella plan`: what would run, what it costs, what was left out and why.
 
 use super::files::display_name;
-use super::{CommandResult, Exit, Terminal, load};
+use super::{CommandResult, Exit, Terminal, load, record};
 use clap::ValueEnum;
 use lamella::Checked;
 use lamella::diagnostic::any_fatal;
-use lamella::plan::document::{self, EmbeddedSource};
+use lamella::plan::document;
 use lamella::plan::explain::explain;
 use lamella::scenario::Settings;
 use lamella::source::FileId;
-use lamella::syntax;
 use std::path::PathBuf;
 
 /// Show what would run, what it costs, and what was left out and why
@@ -62,9 +61,8 @@ fn product(arguments: &Arguments, checked: &Checked) -> Option<String> {
         Some(Emit::Scenario) => scenario.map(|scenario| format!("{scenario:#?}\n")),
         Some(Emit::Plan) => compiled.map(|compiled| format!("{:#?}\n", compiled.plan)),
         Some(Emit::Yaml) => {
-            let source = checked.sources.file(FileId(0));
-            let text = syntax::format(&checked.file, &source.text);
-            let sources = [EmbeddedSource::new(&source.name, text)];
+            let name = checked.sources.file(FileId(0)).name.clone();
+            let sources = record::embedded(checked, name);
             Some(document::write(compiled?, scenario?, &sources))
         }
         None => compiled.map(|compiled| {

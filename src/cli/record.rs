@@ -9,7 +9,7 @@ use lamella::plan::compile::Compiled;
 use lamella::plan::document::{self, EmbeddedSource};
 use lamella::scenario::Scenario;
 use lamella::source::FileId;
-use lamella::syntax;
+use lamella::syntax::{self, tree};
 use lamella::table::{Parameter, PointRow, Record, Status, Swept, SweptValue, Value, si_text};
 
 const VERSION: &str = env!("CARGO_PKG_VERSION");
@@ -23,7 +23,7 @@ pub(crate) fn record(
 ) -> Record {
     let text = &checked.sources.file(FileId(0)).text;
     let scene_text = syntax::format(&checked.file, text);
-    let sources = [EmbeddedSource::new(format!("{scene_name}.lam"), scene_text.clone())];
+    let sources = embedded(checked, format!("{scene_name}.lam"));
     let mut record = Record {
         scene_name: scene_name.to_owned(),
         plan_hash: compiled.hash.clone(),
@@ -35,6 +35,15 @@ pub(crate) fn record(
     };
     add_scenario(&mut record, scenario);
     record
+}
+
+/// The texts that a plan carries: the scene under this name, then the files that it uses under the paths
+/// by which it uses them.
+pub(crate) fn embedded(checked: &Checked, name: String) -> Vec<EmbeddedSource> {
+    let text = |file: &tree::File| syntax::format(file, &checked.sources.file(file.file).text);
+    let scene = EmbeddedSource::new(name, text(&checked.file));
+    let used = checked.uses.list.iter().map(|used| EmbeddedSource::new(&used.path, text(&used.file)));
+    std::iter::once(scene).chain(used).collect()
 }
 
 fn add_scenario(record: &mut Record, scenario: &Scenario) {

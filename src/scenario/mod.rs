@@ -22,6 +22,7 @@ mod scope;
 mod settings;
 mod slot;
 pub mod sweep;
+mod used;
 mod zones;
 
 use crate::source::{Span, Spanned};
@@ -33,6 +34,7 @@ pub use collect::resolve;
 pub use geometry::MAX_BINS;
 pub use measure::{Fact, Field, FieldTarget, Norm, Scalar};
 pub use places::SAME_TIME;
+pub use used::{MAX_USES, Used, Uses, resolve_all, wanted_files};
 
 /// What the command line adds to a scene.
 #[derive(Debug, Clone, Default)]

@@ -103,7 +103,8 @@ impl<'a> Scope<'a> {
             // Kinds of statements are gathered one after another: the text decides which came first.
             self.doubtful.insert(text.to_owned());
             let mut places = [(known.span, known.origin), (name.span, origin)];
-            places.sort_by_key(|(span, _)| span.start);
+            // What a used file defines was there before.
+            places.sort_by_key(|(span, _)| (std::cmp::Reverse(span.file), span.start));
             let [first, second] = places;
             diagnostics.push(
                 Diagnostic::error(D002, format!("`{text}` is defined twice"))
@@ -203,7 +204,7 @@ fn misspelt_definition(name: &str, first_use: Span, written: &str, entry: &Entry
 }
 
 /// What a name means before any scene speaks.
-fn reserved_meaning(name: &str, axes: &[String]) -> Option<String> {
+pub(super) fn reserved_meaning(name: &str, axes: &[String]) -> Option<String> {
     if let Some((_, meaning)) = RESERVED.iter().find(|(reserved, _)| *reserved == name) {
         return Some((*meaning).to_owned());
     }

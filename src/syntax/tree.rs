@@ -111,7 +111,7 @@ pub enum StatementKind {
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Use {
-    /// Relative to the file that uses it.
+    /// Relative to the folder of the file that uses it.
     pub path: Text,
     pub alias: Name,
 }
@@ -141,7 +141,7 @@ pub enum SweepEntry {
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct SweepAxis {
-    /// A parameter, or a word such as `particles`.
+    /// A parameter, or a word such as `particles`; with dots where it is that of a used scene.
     pub target: Name,
     pub values: Vec<SweepValue>,
 }
@@ -368,6 +368,7 @@ pub struct Reference {
 pub struct Target {
     /// An output kind; absent means the concentration.
     pub output: Option<Name>,
+    /// With dots for species of a used scene: `column.A`.
     pub species: Vec<Name>,
 }
 

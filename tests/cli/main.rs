@@ -6,3 +6,4 @@ mod overhead;
 mod program;
 mod runs;
 mod scenes;
+mod used;

@@ -57,6 +57,8 @@ impl Folder {
 
     pub fn write(&self, name: &str, content: impl AsRef<[u8]>) -> PathBuf {
         let path = self.path(name);
+        let folder = path.parent().expect("a file lies in a folder");
+        std::fs::create_dir_all(folder).expect("a temporary folder can be written");
         std::fs::write(&path, content).expect("a temporary folder can be written");
         path
     }

@@ -225,7 +225,7 @@ fn target(parts: &mut Parts) -> Built<Target> {
     let pair = parts.need(Rule::target)?;
     let mut inner = Parts::of(parts.place, pair);
     let output = inner.take(Rule::target_kind).map(|pair| Parts::of(inner.place, pair).name()).transpose()?;
-    Ok(Target { output, species: inner.names(Rule::name) })
+    Ok(Target { output, species: inner.names(Rule::dotted) })
 }
 
 fn measure(parts: &mut Parts) -> Built<Measure> {

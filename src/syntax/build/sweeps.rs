@@ -4,7 +4,7 @@
 //! It deliberately allows every entry any number of times: `scenario` says which may stand once.
 
 use super::statements::{each, whole_number};
-use super::{Parts, span_at};
+use super::{Parts, span_at, spanned};
 use crate::syntax::climb::Built;
 use crate::syntax::grammar::Rule;
 use crate::syntax::tree::{Criterion, Expect, Replicates, Report, Sweep, SweepAxis, SweepEntry, SweepValue};
@@ -30,7 +30,8 @@ pub fn sweep(parts: &mut Parts) -> Built<Sweep> {
 }
 
 fn axis(parts: &mut Parts) -> Built<SweepAxis> {
-    Ok(SweepAxis { target: parts.name()?, values: each(parts, Rule::sweep_value, value)? })
+    let target = parts.need(Rule::dotted)?;
+    Ok(SweepAxis { target: spanned(parts.place, &target), values: each(parts, Rule::sweep_value, value)? })
 }
 
 fn value(parts: &mut Parts) -> Built<SweepValue> {

@@ -70,7 +70,9 @@ pub fn expected_words(rule: Rule) -> Vec<String> {
         R::expression | R::prefix | R::number | R::conditional | R::call | R::path | R::tuple => one(VALUE),
         R::range => one("a range `low .. high`"),
         R::infix => one("an operator"),
-        R::name | R::term | R::species_item | R::species_list | R::assignment | R::target => one("a name"),
+        R::name | R::dotted | R::term | R::species_item | R::species_list | R::assignment | R::target => {
+            one("a name")
+        }
         R::reactants | R::products | R::target_kind => one("a name"),
         R::kind | R::output_kind | R::shape | R::boundary_kind => one("a kind"),
         R::setting => one("a setting"),

@@ -163,7 +163,10 @@ impl Stop<'_> {
         Some(match (previous, self.word(at)) {
             ("*", "*") => "a power is written `^`".to_owned(),
             (_, "=") if self.expected.contains(&Rule::infix) => "equality is written `==`".to_owned(),
-            (_, word) if RESERVED_WORDS.contains(&word) && self.expected.contains(&Rule::name) => {
+            (_, word)
+                if RESERVED_WORDS.contains(&word)
+                    && [Rule::name, Rule::dotted].iter().any(|rule| self.expected.contains(rule)) =>
+            {
                 format!("`{}` is a word of the language and cannot be a name", shortened(word))
             }
             _ => return None,

@@ -1,0 +1,140 @@
+//! Every expression and every dotted name of a statement.
+//!
+//! Owns the walk. May use the tree. It deliberately knows no meaning: who visits says what to do.
+
+use crate::syntax::tree::{
+    Axis, Expr, ExprKind, Name, Range, StatementKind, SweepAxis, SweepEntry, SweepValue, Times,
+};
+
+/// What is done at each place.
+pub(super) trait Visitor {
+    /// An expression, after those inside it.
+    fn expression(&mut self, expr: &mut Expr);
+    /// A name that may stand with the alias of a used scene before it.
+    fn dotted(&mut self, name: &mut Name);
+}
+
+pub(super) fn visit(kind: &mut StatementKind, visitor: &mut impl Visitor) {
+    match kind {
+        StatementKind::Let(it) => expression(&mut it.value, visitor),
+        StatementKind::Param(it) => {
+            expression(&mut it.value, visitor);
+            it.range.iter_mut().for_each(|it| range(it, visitor));
+        }
+        StatementKind::Function(it) => expression(&mut it.body, visitor),
+        StatementKind::Reaction(it) => expression(&mut it.rate, visitor),
+        StatementKind::Domain(it) => {
+            it.axes.iter_mut().for_each(|it| axis(it, visitor));
+            it.frame.iter_mut().for_each(|it| expression(it, visitor));
+        }
+        StatementKind::Flow(it) => it.argument.iter_mut().for_each(|it| expression(it, visitor)),
+        StatementKind::Dispersion(it) => expression(it, visitor),
+        StatementKind::MixingZones(zones) => {
+            let fields = zones.iter_mut().flat_map(|zone| &mut zone.fields);
+            fields.for_each(|it| expression(&mut it.value, visitor));
+        }
+        StatementKind::Average(it) => expressions(&mut it.counts, visitor),
+        StatementKind::Initial(list) => {
+            list.iter_mut().for_each(|it| expression(&mut it.value, visitor));
+        }
+        StatementKind::Particles(it) => expression(&mut it.count, visitor),
+        StatementKind::Run(it) => {
+            expression(&mut it.duration, visitor);
+            it.step.iter_mut().for_each(|it| expression(it, visitor));
+        }
+        StatementKind::Output(it) => {
+            expressions(&mut it.grid, visitor);
+            match &mut it.times {
+                Some(Times::List(list)) => expressions(list, visitor),
+                Some(Times::Every(every)) => expression(every, visitor),
+                None => {}
+            }
+        }
+        StatementKind::Reference(it) => {
+            it.target.species.iter_mut().for_each(|name| visitor.dotted(name));
+            expression(&mut it.value, visitor);
+        }
+        StatementKind::Measure(it) => {
+            expression(&mut it.value, visitor);
+            it.over.iter_mut().for_each(|it| axis(it, visitor));
+            it.times.iter_mut().for_each(|list| expressions(list, visitor));
+        }
+        StatementKind::Sweep(it) => it.entries.iter_mut().for_each(|it| sweep_entry(it, visitor)),
+        StatementKind::Edition(_)
+        | StatementKind::Title(_)
+        | StatementKind::Cite(_)
+        | StatementKind::Seed(_)
+        | StatementKind::Species(_)
+        | StatementKind::Boundary(_)
+        | StatementKind::Use(_)
+        | StatementKind::Report(_) => {}
+    }
+}
+
+fn sweep_entry(entry: &mut SweepEntry, visitor: &mut impl Visitor) {
+    match entry {
+        SweepEntry::Axis(it) => sweep_axis(it, visitor),
+        SweepEntry::Zip(_, axes) => axes.iter_mut().for_each(|it| sweep_axis(it, visitor)),
+        SweepEntry::Replicates(it) => {
+            expression(&mut it.least, visitor);
+            if let Some((most, criterion)) = &mut it.until {
+                expression(most, visitor);
+                expression(&mut criterion.threshold, visitor);
+            }
+        }
+        SweepEntry::Skip(_, it) => expression(it, visitor),
+        SweepEntry::Expect(it) => {
+            expression(&mut it.value, visitor);
+            it.range.iter_mut().for_each(|it| range(it, visitor));
+            it.when.iter_mut().for_each(|it| expression(it, visitor));
+        }
+        SweepEntry::Seed(_) | SweepEntry::Common(_) => {}
+    }
+}
+
+fn sweep_axis(axis: &mut SweepAxis, visitor: &mut impl Visitor) {
+    visitor.dotted(&mut axis.target);
+    for value in &mut axis.values {
+        match value {
+            SweepValue::One(it) => expression(it, visitor),
+            SweepValue::Progression { range: ends, by, .. } => {
+                range(ends, visitor);
+                expression(by, visitor);
+            }
+        }
+    }
+}
+
+fn axis(axis: &mut Axis, visitor: &mut impl Visitor) {
+    range(&mut axis.range, visitor);
+}
+
+fn range(range: &mut Range, visitor: &mut impl Visitor) {
+    expression(&mut range.low, visitor);
+    expression(&mut range.high, visitor);
+}
+
+fn expressions(list: &mut [Expr], visitor: &mut impl Visitor) {
+    list.iter_mut().for_each(|it| expression(it, visitor));
+}
+
+fn expression(expr: &mut Expr, visitor: &mut impl Visitor) {
+    match &mut expr.kind {
+        ExprKind::Number(_) | ExprKind::Path(_) => {}
+        ExprKind::Call { arguments, .. } => {
+            arguments.iter_mut().for_each(|it| expression(&mut it.value, visitor));
+        }
+        ExprKind::Unary { operand, .. } => expression(operand, visitor),
+        ExprKind::Binary { left, right, .. } => {
+            expression(left, visitor);
+            expression(right, visitor);
+        }
+        ExprKind::If { condition, then, otherwise } => {
+            for part in [condition, then, otherwise] {
+                expression(part, visitor);
+            }
+        }
+        ExprKind::Tuple(parts) => expressions(parts, visitor),
+    }
+    visitor.expression(expr);
+}
