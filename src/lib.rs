@@ -12,6 +12,7 @@ pub mod report;
 pub mod scenario;
 pub mod source;
 pub mod state;
+pub mod sweep;
 pub mod syntax;
 pub mod table;
 pub mod units;
@@ -29,6 +30,8 @@ pub struct Checked {
     pub sources: Sources,
     /// The first file; statements of used files are not in it.
     pub file: tree::File,
+    /// The same with the statements that [`check_with`] was given besides.
+    pub whole: tree::File,
     /// The files that it uses.
     pub uses: Uses,
     /// Absent if the scene is wrong. Of several used scenes it is that of the first sweep.
@@ -46,15 +49,33 @@ pub fn base(file: &tree::File, sources: &Sources, alias: Option<&str>) -> tree::
 }
 
 /// Takes the first file of `sources` as far as it goes. Ends for every text, and never panics.
-pub fn check(mut sources: Sources, settings: &Settings, options: &Options) -> Checked {
+pub fn check(sources: Sources, settings: &Settings, options: &Options) -> Checked {
+    check_with(sources, &[], settings, options)
+}
+
+/// The same with further statements: each text begins with its own `lamella 1`.
+pub fn check_with(
+    mut sources: Sources,
+    further: &[(&str, String)],
+    settings: &Settings,
+    options: &Options,
+) -> Checked {
     let (file, mut diagnostics) = syntax::parse(FileId(0), &sources.file(FileId(0)).text);
-    let uses = Uses::read(&file, &sources);
+    let mut whole = file.clone();
+    for (name, text) in further {
+        let id = sources.add(*name, text.clone());
+        let (more, messages) = syntax::parse(id, text);
+        whole.statements.extend(more.statements);
+        diagnostics.extend(messages);
+    }
+    let uses = Uses::read(&whole, &sources);
     diagnostics.extend(uses.syntax.iter().cloned());
     let has_syntax_errors = any_fatal(&diagnostics);
     diagnostics.extend(uses.diagnostics.iter().cloned());
     let mut scenario = None;
     if uses.are_whole {
-        let (resolved, more) = scenario::resolve_all(&file, &uses, &mut sources, settings, has_syntax_errors);
+        let (resolved, more) =
+            scenario::resolve_all(&whole, &uses, &mut sources, settings, has_syntax_errors);
         diagnostics.extend(more);
         scenario = resolved.filter(|_| !any_fatal(&diagnostics));
     }
@@ -65,5 +86,5 @@ pub fn check(mut sources: Sources, settings: &Settings, options: &Options) -> Ch
     });
     // What stops a scene comes before what it may be run with.
     diagnostics.sort_by_key(|diagnostic| !diagnostic.is_fatal());
-    Checked { sources, file, uses, scenario, compiled, diagnostics }
+    Checked { sources, file, whole, uses, scenario, compiled, diagnostics }
 }

@@ -252,7 +252,8 @@ fn every_code_has_a_page_that_explains_it() {
 #[test]
 fn every_code_has_a_fixture() {
     let shown: String = files_below("tests/diagnostics", "txt").iter().map(|path| read(path)).collect();
-    let of_program = files_below("tests/cli", "rs").into_iter().chain(files_below("src/cli", "rs"));
+    let of_program =
+        ["tests/cli", "tests/sweeps", "src/cli"].into_iter().flat_map(|folder| files_below(folder, "rs"));
     let in_program: String = of_program.map(|path| read(&path)).collect();
     let is_shown = |code: &str| {
         let is_outside = code.starts_with(['F', 'R', 'L']);

@@ -1,11 +1,16 @@
 //! From a path to a plan; what `check`, `plan` and `run` have in common.
 
 use super::files::{display_name, is_stdin, read_scene};
-use super::{Stopped, machine};
+use super::run::scene_name;
+use super::{Exit, Stopped, Terminal, machine, record};
 use lamella::Checked;
-use lamella::plan::compile::{Options, Selection};
-use lamella::scenario::{Settings, wanted_files};
+use lamella::diagnostic::{Diagnostic, codes};
+use lamella::plan::compile::{Compiled, Options, Selection};
+use lamella::scenario::{Scenario, Settings, wanted_files};
 use lamella::source::{FileId, RefusedFile, Sources};
+use lamella::sweep::Scene;
+use lamella::sweep::frame::Session;
+use lamella::table::Record;
 use std::path::Path;
 
 /// Reads a scene and takes it as far as it goes.
@@ -45,6 +50,144 @@ fn read_used(scene: &Path, path: &str) -> Result<String, (String, bool)> {
         return Err((format!("{} is a link that leads out of this folder", display_name(&file)), true));
     }
     read_scene(&file).map_err(|stopped| (stopped.message.message.clone(), false))
+}
+
+/// `--over AXIS=VALUES`: a sweep without a statement.
+pub(crate) struct Over<'a> {
+    pub(crate) axes: &'a [String],
+    pub(crate) replicates: Option<u32>,
+}
+
+impl Over<'_> {
+    /// The statement that the scene does not have.
+    fn statement(&self) -> String {
+        let axes: Vec<String> = self.axes.iter().map(|axis| axis.replacen('=', " ", 1)).collect();
+        let replicates = self.replicates.map_or(String::new(), |n| format!("\n  replicates {n}"));
+        format!("lamella 1\nsweep command_line {{\n  {}{replicates}\n}}\n", axes.join("\n  "))
+    }
+}
+
+/// A scene with one of its sweeps, ready to be run.
+pub(crate) struct Sweep {
+    pub(crate) scene: Scene,
+    /// Of the scene without a point.
+    pub(crate) scenario: Scenario,
+    pub(crate) compiled: Compiled,
+    pub(crate) record: Record,
+    /// As it was given on the command line.
+    pub(crate) path: String,
+    pub(crate) scene_name: String,
+}
+
+/// Reads a scene and picks its sweep; nothing if the scene is wrong, which has been told.
+pub(crate) fn load_sweep(
+    path: &Path,
+    name: Option<&str>,
+    over: Option<&Over>,
+    settings: &Settings,
+    terminal: &Terminal,
+) -> Result<Option<Sweep>, Stopped> {
+    let mut sources = Sources::single(display_name(path), read_scene(path)?);
+    add_used(&mut sources, path);
+    let further: Vec<(&str, String)> = over.map(|over| ("--over", over.statement())).into_iter().collect();
+    let name = if over.is_some() { Some("command_line") } else { name };
+    pick(sources, &further, name, settings, (display_name(path), scene_name(path)), Some(terminal))
+}
+
+/// The sweep of a session of a journal.
+pub(crate) fn load_session(session: &Session) -> Result<Option<Sweep>, Stopped> {
+    let Some((path, text)) = session.sources.first() else { return Ok(None) };
+    let mut sources = Sources::single(path, text);
+    let (of_program, used): (Vec<_>, Vec<_>) =
+        session.sources[1..].iter().partition(|(name, _)| name.starts_with("--"));
+    for (name, text) in used {
+        sources.add(name, text);
+    }
+    let further: Vec<(&str, String)> =
+        of_program.iter().map(|(name, text)| (name.as_str(), text.clone())).collect();
+    let settings = Settings { set: session.set.clone(), seed: session.seed, ..Settings::default() };
+    let names = (path.clone(), scene_name(Path::new(path)));
+    pick(sources, &further, Some(&session.sweep), &settings, names, None)
+}
+
+fn pick(
+    sources: Sources,
+    further: &[(&str, String)],
+    name: Option<&str>,
+    settings: &Settings,
+    (path, scene_name): (String, String),
+    terminal: Option<&Terminal>,
+) -> Result<Option<Sweep>, Stopped> {
+    let options = Options { passes: Selection::All, memory: machine::available_memory() };
+    let mut checked = lamella::check_with(sources, further, settings, &options);
+    if let Some(terminal) = terminal {
+        terminal.diagnostics(&checked.diagnostics, &checked.sources);
+    }
+    let (Some(compiled), Some(scenario)) = (checked.compiled.take(), checked.scenario.take()) else {
+        return Ok(None);
+    };
+    let sweep = choose(&scenario, name)?;
+    let record = record::record(&checked, &scenario, &compiled, &scene_name);
+    // The statements of the used scene belong to every point.
+    let file = lamella::base(&checked.whole, &checked.sources, sweep.of.as_deref());
+    let scene = Scene::new(file, checked.sources, settings.clone(), options, &scenario, sweep);
+    Ok(Some(Sweep { scene, scenario, compiled, record, path, scene_name }))
+}
+
+/// The sweep of that name, or the only one.
+fn choose(scenario: &Scenario, name: Option<&str>) -> Result<lamella::scenario::sweep::Sweep, Stopped> {
+    let names: Vec<String> = scenario.sweeps.iter().map(|sweep| format!("`{}`", sweep.name)).collect();
+    let found = match name {
+        Some(name) => scenario.sweeps.iter().find(|sweep| sweep.name == name),
+        None if scenario.sweeps.len() == 1 => scenario.sweeps.first(),
+        None => None,
+    };
+    found.cloned().ok_or_else(|| {
+        let what = match (name, names.is_empty()) {
+            (_, true) => "the scene has no sweep".to_owned(),
+            (Some(name), _) => format!("the scene has no sweep `{name}`"),
+            (None, _) => "the scene has several sweeps".to_owned(),
+        };
+        let message = Diagnostic::error(codes::F120, what);
+        let message = match names.is_empty() {
+            true => message.help("write a `sweep` statement, or give `--over step=1s,2s`"),
+            false => message.expected(names.join(", ")).help("name it after the file"),
+        };
+        Stopped::new(Exit::SceneWrong, message)
+    })
+}
+
+impl Sweep {
+    /// What a journal remembers of this start.
+    pub(crate) fn session(&self, started: i64) -> Session {
+        let texts = self.scene.sources.files().filter(|(_, file)| file.name != "--set");
+        Session {
+            sources: texts.map(|(_, file)| (file.name.clone(), file.text.clone())).collect(),
+            set: self.scene.settings.set.clone(),
+            seed: self.scene.settings.seed,
+            sweep: self.scene.sweep.name.clone(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            started,
+            facts: vec![("host".to_owned(), machine::host())],
+        }
+    }
+
+    /// The command that runs one replicate of one point alone.
+    pub(crate) fn command(&self, combination: u64, seed: u64) -> String {
+        let mut words = vec!["lamella run".to_owned(), shell_word(&self.path)];
+        let own = self.scene.settings.set.iter().cloned();
+        for (name, value) in own.chain(self.scene.assignments(combination)) {
+            words.push(format!("--set {}", shell_word(&format!("{name}={value}"))));
+        }
+        words.push(format!("--seed {seed}"));
+        words.join(" ")
+    }
+}
+
+/// A word that a shell leaves as it is.
+fn shell_word(text: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_=./+,:".contains(c);
+    if text.chars().all(is_plain) { text.to_owned() } else { format!("'{}'", text.replace('\'', "'\\''")) }
 }
 
 /// `name=value` of `--set`, as it was typed; the value is an expression of the language.

@@ -17,6 +17,8 @@ mod progress;
 mod record;
 mod run;
 mod summary;
+mod sweep;
+mod sweep_folder;
 mod terminal;
 mod text;
 
@@ -73,6 +75,9 @@ enum Command {
     Fmt(fmt::Arguments),
     Plan(plan::Arguments),
     Run(run::Arguments),
+    Sweep(sweep::Arguments),
+    Gather(sweep_folder::GatherArguments),
+    Status(sweep_folder::StatusArguments),
     Explain(explain::Arguments),
     Completions(completions::Arguments),
 }
@@ -111,6 +116,9 @@ pub(crate) fn main() -> ExitCode {
         Command::Fmt(fmt) => fmt::run(fmt, &terminal),
         Command::Plan(plan) => plan::run(plan, &terminal),
         Command::Run(run) => run::run(run, &terminal),
+        Command::Sweep(sweep) => sweep::run(sweep, &terminal),
+        Command::Gather(gather) => sweep_folder::gather(gather, &terminal),
+        Command::Status(status) => sweep_folder::status(status, &terminal),
         Command::New(new) => new::run(new, &terminal),
         Command::Explain(explain) => explain::run(explain, &terminal),
         Command::Completions(completions) => completions::run(completions, &terminal),

@@ -54,7 +54,7 @@ impl Arguments {
 }
 
 /// The file's name without its ending.
-fn scene_name(file: &Path) -> String {
+pub(crate) fn scene_name(file: &Path) -> String {
     if is_stdin(file) {
         return "stdin".to_owned();
     }

@@ -74,8 +74,13 @@ pub fn compile(scenario: &Scenario, options: &Options) -> (Option<Compiled>, Vec
 /// BLAKE3 over the canonical text of a plan: JSON with fields in the order of their definition and
 /// numbers in their shortest form that reads back to the same bits.
 pub fn hash(plan: &Plan) -> String {
+    hash_of(plan).to_hex().to_string()
+}
+
+/// The same as bytes.
+pub fn hash_of(plan: &Plan) -> blake3::Hash {
     let text = serde_json::to_string(plan).expect("plans hold finite numbers, lists and names only");
-    blake3::hash(text.as_bytes()).to_hex().to_string()
+    blake3::hash(text.as_bytes())
 }
 
 impl Compiled {

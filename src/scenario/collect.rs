@@ -52,8 +52,14 @@ pub fn resolve(
     let given = read_settings(file, sources, settings, &mut diagnostics);
     let mut overrides = given.params;
     let mut statements = gather(file, &mut diagnostics);
-    let of_point = super::point::Replaced::new(&statements, given.sizes.iter().chain(&settings.point));
+    let point = given.sizes.iter().chain(settings.point.iter().flatten());
+    let of_point = super::point::Replaced::new(&statements, point);
     of_point.replace(&mut statements);
+    if settings.point.is_some() {
+        // The sweep has been worked out once: a point must not work out all others again.
+        statements.sweeps.clear();
+        statements.reports.clear();
+    }
     overrides.extend(of_point.parameters.iter().cloned());
     let mut checker = Checker {
         scope: Scope::default(),

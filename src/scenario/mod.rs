@@ -43,8 +43,9 @@ pub struct Settings {
     pub set: Vec<(String, String)>,
     /// `--seed`, or the seed of a point and replicate.
     pub seed: Option<u64>,
-    /// What a point of a sweep sets: these expressions stand in place of the scene's own.
-    pub point: Vec<(sweep::Target, crate::syntax::tree::Expr)>,
+    /// What a point of a sweep sets: these expressions stand in place of the scene's own. A point has no
+    /// sweeps.
+    pub point: Option<Vec<(sweep::Target, crate::syntax::tree::Expr)>>,
 }
 
 /// A whole scene, resolved.

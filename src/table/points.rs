@@ -40,6 +40,16 @@ impl Shape {
     }
 }
 
+impl Shape {
+    /// What the column of a swept value is called.
+    pub fn column_of(&self, name: &str) -> String {
+        let columns = table(self, &[]).0;
+        let long = format!("swept.{name}");
+        let has_long = columns.iter().any(|column| column.name == long);
+        if has_long { long } else { name.to_owned() }
+    }
+}
+
 /// Columns and their values, for any number of points.
 pub fn table(shape: &Shape, rows: &[PointRow]) -> (Vec<Column>, Vec<ArrayRef>) {
     let mut table = Table { columns: Vec::new(), arrays: Vec::new(), shape, rows };

@@ -12,7 +12,7 @@ use super::collect::Statements;
 use super::condition::{Condition, known_names};
 use super::{Measure, Parameter};
 use crate::diagnostic::Diagnostic;
-use crate::diagnostic::codes::{M002, W002};
+use crate::diagnostic::codes::{M002, W002, W007};
 use crate::source::Span;
 use crate::syntax::tree::{self, SweepEntry};
 use crate::units::Dimension;
@@ -200,6 +200,7 @@ fn sweep<'a>(
         }
     }
     set_once(checker, &sweep);
+    bounded(checker, &sweep, written.name.span);
     conditions(checker, written, parameters, measures, &mut sweep);
     let is_right = !checker.diagnostics[n_before..].iter().any(Diagnostic::is_fatal);
     is_right.then_some(sweep)
@@ -252,6 +253,23 @@ fn only_once(checker: &mut Checker<'_>, written: &tree::Sweep) {
                     .expected("one of them"),
             );
         }
+    }
+}
+
+/// Most points of a sweep.
+const MAX_POINTS: f64 = 2e7;
+
+fn bounded(checker: &mut Checker<'_>, sweep: &Sweep, span: Span) {
+    let lengths = sweep.groups.iter().filter_map(|group| group.first()).map(|axis| axis.values.len());
+    let n: f64 = lengths.map(|n| n as f64).product();
+    if n > MAX_POINTS {
+        checker.report(
+            Diagnostic::error(W007, format!("the sweep `{}` has too many points", sweep.name))
+                .at(span, "all combinations of its axes")
+                .found(format!("{n} combinations"))
+                .expected(format!("at most {MAX_POINTS}"))
+                .help("write axes that go together in `zip { … }`, or give them fewer values"),
+        );
     }
 }
 

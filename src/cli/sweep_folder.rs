@@ -1,0 +1,178 @@
+//! The folder of a sweep: its journals, `gather` and `status`.
+
+use super::sweep::{failed, pool};
+use super::text::grouped;
+use super::{CommandResult, Exit, Stopped, Terminal, load, machine};
+use lamella::diagnostic::{Diagnostic, codes};
+use lamella::report::ExpectationOutcome;
+use lamella::sweep::frame::Session;
+use lamella::sweep::gather::{Gather, GatherError, Gathered};
+use lamella::sweep::{Journal, JournalError, Points};
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+/// One share of the points: those whose number leaves `number` when divided by `of`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Shard {
+    pub(crate) number: u32,
+    pub(crate) of: u32,
+}
+
+impl Default for Shard {
+    fn default() -> Self {
+        Self { number: 0, of: 1 }
+    }
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || "expected K/N with K from 0 to N - 1, such as 0/4".to_owned();
+        let (number, of) = text.split_once('/').ok_or_else(wrong)?;
+        let (number, of) = (number.parse().map_err(|_| wrong())?, of.parse().map_err(|_| wrong())?);
+        if number < of && of <= 10_000 { Ok(Self { number, of }) } else { Err(wrong()) }
+    }
+}
+
+impl std::fmt::Display for Shard {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}/{}", self.number, self.of)
+    }
+}
+
+/// An open folder.
+pub(crate) struct Folder {
+    pub(crate) journal: Journal,
+}
+
+impl Folder {
+    pub(crate) fn open(out: &Path, shard: Shard) -> Result<Self, Stopped> {
+        let name = format!("shard-{:04}-of-{:04}.journal", shard.number, shard.of);
+        let journal = Journal::open(&out.join("journal").join(name)).map_err(|error| failed(&error))?;
+        Ok(Self { journal })
+    }
+}
+
+/// All journals of a folder, in the order of their names.
+fn journals(folder: &Path) -> Result<Vec<Journal>, Stopped> {
+    let entries = std::fs::read_dir(folder.join("journal")).into_iter().flatten().flatten();
+    let mut paths: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
+    paths.retain(|path| path.extension().is_some_and(|extension| extension == "journal"));
+    paths.sort();
+    let journals: Result<Vec<Journal>, JournalError> = paths.iter().map(|path| Journal::look(path)).collect();
+    let journals = journals.map_err(|error| failed(&error))?;
+    if journals.iter().all(|journal| journal.sessions.is_empty()) {
+        let message = Diagnostic::error(codes::F121, format!("{} holds no sweep", folder.display()))
+            .help("give the folder that `lamella sweep` wrote to");
+        return Err(Stopped::new(Exit::SceneWrong, message));
+    }
+    Ok(journals)
+}
+
+/// The newest session of all journals.
+fn newest(journals: &[Journal]) -> Option<&Session> {
+    journals.iter().flat_map(|journal| &journal.sessions).max_by_key(|session| session.started)
+}
+
+/// Makes the tables of a sweep from the journals of all its shards
+#[derive(clap::Args)]
+pub(crate) struct GatherArguments {
+    /// Folder of the sweep
+    folder: PathBuf,
+}
+
+pub(crate) fn gather(arguments: &GatherArguments, terminal: &Terminal) -> CommandResult {
+    let (journals, loaded) = open(&arguments.folder)?;
+    let pool = pool(machine::n_threads())?;
+    let points = pool.install(|| Points::of(&loaded.scene));
+    let journals: Vec<&Journal> = journals.iter().collect();
+    pool.install(|| gather_and_tell(&loaded, &points, &journals, &arguments.folder, terminal))
+}
+
+/// The journals of a folder and the sweep of their newest session.
+fn open(folder: &Path) -> Result<(Vec<Journal>, load::Sweep), Stopped> {
+    let journals = journals(folder)?;
+    let loaded = newest(&journals).map(load::load_session).transpose()?.flatten();
+    let loaded = loaded.ok_or_else(|| {
+        let text = format!("the scene in the journal of {} cannot be read by this version", folder.display());
+        Stopped::new(Exit::SceneWrong, Diagnostic::error(codes::F121, text))
+    })?;
+    Ok((journals, loaded))
+}
+
+/// Writes the tables and says what is in them.
+pub(crate) fn gather_and_tell(
+    loaded: &load::Sweep,
+    points: &Points,
+    journals: &[&Journal],
+    out: &Path,
+    terminal: &Terminal,
+) -> CommandResult {
+    let gather = Gather {
+        scene: &loaded.scene,
+        points,
+        journals,
+        base: &loaded.compiled,
+        record: &loaded.record,
+        reports: &loaded.scenario.reports,
+        scene_name: &loaded.scene_name,
+        version: env!("CARGO_PKG_VERSION"),
+    };
+    let gathered = gather.write(out).map_err(|error| match &error {
+        GatherError::Journal(_) | GatherError::Table(_) | GatherError::Description(_) => failed(&error),
+    })?;
+    if !terminal.is_quiet() {
+        terminal.product(&summary(&gathered, out))?;
+    }
+    let is_well = gathered.is_met() && gathered.n_failed == 0 && gathered.n_missing == 0;
+    Ok(if is_well { Exit::Done } else { Exit::Failed })
+}
+
+fn summary(gathered: &Gathered, out: &Path) -> String {
+    let mut lines = vec![
+        ("points", grouped(gathered.n_points)),
+        ("replicates", format!("{} done, {} failed", grouped(gathered.n_done), grouped(gathered.n_failed))),
+    ];
+    if gathered.n_missing > 0 {
+        lines.push(("missing", format!("{} points are not complete", grouped(gathered.n_missing))));
+    }
+    for expectation in &gathered.expectations {
+        let verdict = match expectation.outcome {
+            ExpectationOutcome::Met => "met",
+            ExpectationOutcome::NotMet => "NOT MET",
+            ExpectationOutcome::Unknown => "not known",
+        };
+        lines.push(("expected", format!("{}: {verdict} ({})", expectation.text, expectation.detail)));
+    }
+    lines.push(("results", out.display().to_string()));
+    lines.into_iter().map(|(name, text)| format!("{name:<12}{text}\n")).collect()
+}
+
+/// Tell what a sweep has and what is missing
+#[derive(clap::Args)]
+pub(crate) struct StatusArguments {
+    /// Folder of the sweep
+    folder: PathBuf,
+}
+
+pub(crate) fn status(arguments: &StatusArguments, terminal: &Terminal) -> CommandResult {
+    let (journals, loaded) = open(&arguments.folder)?;
+    let pool = pool(machine::n_threads())?;
+    let points = pool.install(|| Points::of(&loaded.scene));
+    let (mut done, mut bad) = (0, 0);
+    for journal in &journals {
+        let (well, not) = journal.counts();
+        (done, bad) = (done + well, bad + not);
+    }
+    let damaged: usize = journals.iter().map(|journal| journal.damaged.len()).sum();
+    let lines = [
+        ("sweep", format!("{} of {}", loaded.scene.sweep.name, loaded.scene_name)),
+        ("points", format!("{}, {} skipped", grouped(points.len() as u64), grouped(points.n_skipped))),
+        ("replicates", format!("{} done, {} failed", grouped(done as u64), grouped(bad as u64))),
+        ("journals", format!("{}, {damaged} damaged places", journals.len())),
+    ];
+    let text: String = lines.into_iter().map(|(name, text)| format!("{name:<12}{text}\n")).collect();
+    terminal.product(&text)?;
+    Ok(Exit::Done)
+}

@@ -1,0 +1,297 @@
+//! From journals to one set of tables.
+//!
+//! Owns the order of rows, which follows from the sweep's definition alone: not from the schedule, the
+//! shards or the history. May use the journals and `table`. It deliberately runs nothing.
+
+use super::expect::Judge;
+use super::frame::Replicate;
+use super::points::{Point, Points};
+use super::queue::Series;
+use super::replicate::refresh;
+use super::{Journal, JournalError, Scene};
+use crate::plan::Plan;
+use crate::plan::compile::Compiled;
+use crate::report::{
+    ExpectationOutcome, SWEEP_FILE, SWEEP_VERSION, SweepAxis, SweepDescription, SweepExpectation,
+    SweepReplicates, SweepReport, SweepReportKind,
+};
+use crate::scenario::Scenario;
+use crate::scenario::sweep::{Report, ReportKind, Target};
+use crate::table::{Gatherer, PointRow, Record, Shape, Status, TableError, WrittenFile, si_text};
+use rayon::prelude::*;
+use std::path::Path;
+
+/// Points that are read side by side before their rows are written.
+const BATCH: usize = 64;
+
+/// What went into the tables.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gathered {
+    pub files: Vec<WrittenFile>,
+    pub n_points: u64,
+    pub n_done: u64,
+    pub n_failed: u64,
+    /// Points with replicates that no journal has.
+    pub n_missing: u64,
+    pub expectations: Vec<SweepExpectation>,
+}
+
+impl Gathered {
+    pub fn is_met(&self) -> bool {
+        self.expectations.iter().all(|expectation| expectation.outcome != ExpectationOutcome::NotMet)
+    }
+}
+
+#[derive(Debug)]
+pub enum GatherError {
+    Journal(JournalError),
+    Table(TableError),
+    Description(String),
+}
+
+impl std::fmt::Display for GatherError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Journal(error) => error.fmt(f),
+            Self::Table(error) => error.fmt(f),
+            Self::Description(error) => f.write_str(error),
+        }
+    }
+}
+
+impl From<JournalError> for GatherError {
+    fn from(error: JournalError) -> Self {
+        Self::Journal(error)
+    }
+}
+
+impl From<TableError> for GatherError {
+    fn from(error: TableError) -> Self {
+        Self::Table(error)
+    }
+}
+
+/// A sweep whose journals become tables.
+pub struct Gather<'a> {
+    pub scene: &'a Scene,
+    pub points: &'a Points,
+    pub journals: &'a [&'a Journal],
+    /// Of the scene without a point.
+    pub base: &'a Compiled,
+    pub record: &'a Record,
+    pub reports: &'a [Report],
+    /// The name of the scene that is swept.
+    pub scene_name: &'a str,
+    /// Version of the program, for rows of points that never ran.
+    pub version: &'a str,
+}
+
+/// One point as it goes into the tables.
+struct Whole {
+    scenario: Option<Scenario>,
+    plan: Option<Plan>,
+    replicates: Vec<Replicate>,
+    is_missing: bool,
+}
+
+impl Gather<'_> {
+    /// Writes all tables into `folder`. Points that are not in the journals have no rows.
+    pub fn write(&self, folder: &Path) -> Result<Gathered, GatherError> {
+        let shape = self.shape()?;
+        let mut gatherer = Gatherer::create(folder, &self.base.plan, self.record, shape.clone())?;
+        let mut judge = Judge::new(self.scene);
+        let mut gathered = Gathered {
+            files: Vec::new(),
+            n_points: self.points.len() as u64,
+            n_done: 0,
+            n_failed: 0,
+            n_missing: 0,
+            expectations: Vec::new(),
+        };
+        for (batch_idx, batch) in self.points.list.chunks(BATCH).enumerate() {
+            let wholes: Vec<Result<Whole, JournalError>> =
+                batch.par_iter().map(|point| self.whole(point)).collect();
+            for (idx, (point, whole)) in batch.iter().zip(wholes).enumerate() {
+                let number = (batch_idx * BATCH + idx) as u32;
+                self.add(number, point, whole?, &mut gatherer, &mut judge, &mut gathered)?;
+            }
+        }
+        let is_whole = gathered.n_missing == 0;
+        gathered.expectations = judge.judge(is_whole);
+        let description = self.description(&gathered.expectations, &shape);
+        let description = description.to_json().map_err(GatherError::Description)?;
+        gathered.files = gatherer.finish(&[(SWEEP_FILE, &description)])?.files;
+        Ok(gathered)
+    }
+
+    /// Columns in the order of the axes, then what the first replicate that ended well has, with the
+    /// references and measures of today: every other one has the same.
+    fn shape(&self) -> Result<Shape, JournalError> {
+        let mut shape = Shape::default();
+        if let Some(point) = self.points.list.first() {
+            let swept = self.scene.swept(point.combination);
+            shape.add(&PointRow { swept, ..refused_row(self.version) });
+        }
+        for point in &self.points.list {
+            let replicates = self.whole(point)?.replicates;
+            if let Some(done) = replicates.iter().find(|replicate| replicate.row.status == Status::Done) {
+                shape.add(&PointRow { swept: Vec::new(), ..done.row.clone() });
+                break;
+            }
+        }
+        Ok(shape)
+    }
+
+    fn whole(&self, point: &Point) -> Result<Whole, JournalError> {
+        let nothing = Whole { scenario: None, plan: None, replicates: Vec::new(), is_missing: false };
+        if point.refusal.is_some() {
+            return Ok(nothing);
+        }
+        let Ok((scenario, compiled)) = self.scene.compile(point.combination) else { return Ok(nothing) };
+        let replicates = &self.scene.sweep.replicates;
+        let (mut list, mut series): (Vec<Replicate>, Series) = (Vec::new(), Series::default());
+        let mut is_missing = false;
+        loop {
+            let number = list.len() as u32;
+            if number >= series.needed(replicates).0 {
+                break;
+            }
+            let (_, key) = self.scene.replicate(&compiled.plan, point.combination, number);
+            // One that ended well comes before one that failed in another shard's journal.
+            let found = self.journals.iter().filter_map(|journal| Some((*journal, journal.entry(&key)?)));
+            let Some((journal, entry)) = found.min_by_key(|(_, entry)| entry.status != Status::Done) else {
+                is_missing = true;
+                break;
+            };
+            let mut replicate = journal.replicate(entry)?;
+            refresh(&mut replicate, &scenario, &compiled);
+            if let Some(until) = &replicates.until {
+                let value = replicate.row.values.iter().find(|value| value.name == until.measure);
+                series.set(number, value.and_then(|value| value.value).unwrap_or(f64::NAN));
+            }
+            list.push(replicate);
+        }
+        Ok(Whole { scenario: Some(scenario), plan: Some(compiled.plan), replicates: list, is_missing })
+    }
+
+    fn add(
+        &self,
+        number: u32,
+        point: &Point,
+        whole: Whole,
+        gatherer: &mut Gatherer,
+        judge: &mut Judge,
+        gathered: &mut Gathered,
+    ) -> Result<(), GatherError> {
+        gathered.n_missing += u64::from(whole.is_missing);
+        if let Some(refusal) = &point.refusal {
+            gathered.n_failed += 1;
+            let row = PointRow {
+                point: number,
+                swept: self.scene.swept(point.combination),
+                error_code: Some(refusal.code.clone()),
+                error_message: Some(refusal.message.clone()),
+                ..refused_row(self.version)
+            };
+            return Ok(gatherer.add(&self.base.plan, row, &[], Vec::new())?);
+        }
+        let (Some(scenario), Some(plan)) = (&whole.scenario, &whole.plan) else { return Ok(()) };
+        for (idx, mut replicate) in whole.replicates.into_iter().enumerate() {
+            let place = (number, idx as u32);
+            (replicate.row.point, replicate.row.replicate) = place;
+            // A renamed axis is another column, whatever it was called when the point ran.
+            replicate.row.swept = self.scene.swept(point.combination);
+            for error in &mut replicate.errors {
+                (error.point, error.replicate) = place;
+            }
+            if replicate.row.status == Status::Done {
+                gathered.n_done += 1;
+                judge.look(point.combination, scenario, &replicate.row);
+            } else {
+                gathered.n_failed += 1;
+            }
+            gatherer.add(plan, replicate.row, &replicate.snapshots, replicate.errors)?;
+        }
+        Ok(())
+    }
+
+    fn description(&self, expectations: &[SweepExpectation], shape: &Shape) -> SweepDescription {
+        let scene = self.scene;
+        let axes = scene.sweep.groups.iter().enumerate().flat_map(|(group, axes)| {
+            axes.iter().map(move |axis| SweepAxis {
+                name: axis.target.name().to_owned(),
+                column: column(shape, &axis.target),
+                unit: si_text(axis.dimension),
+                values: axis.values.iter().map(|value| value.si.iter().product()).collect(),
+                group: group as u32,
+            })
+        });
+        let replicates = &scene.sweep.replicates;
+        let most = replicates.until.as_ref().map_or(replicates.least, |until| until.most);
+        SweepDescription {
+            version: SWEEP_VERSION,
+            name: scene.sweep.name.clone(),
+            scene: self.scene_name.to_owned(),
+            axes: axes.collect(),
+            n_points: self.points.len() as u64,
+            n_skipped: self.points.n_skipped,
+            replicates: SweepReplicates { least: replicates.least, most },
+            seed: scene.root_seed(),
+            has_common_random_numbers: scene.sweep.has_common_numbers,
+            reports: self.reports.iter().map(report).collect(),
+            expectations: expectations.to_vec(),
+        }
+    }
+}
+
+/// The column of `points.parquet` that holds an axis.
+fn column(shape: &Shape, target: &Target) -> String {
+    match target {
+        Target::Particles | Target::Step => target.name().to_owned(),
+        Target::Parameter(_) | Target::Bins => shape.column_of(target.name()),
+    }
+}
+
+fn report(report: &Report) -> SweepReport {
+    SweepReport {
+        kind: match report.kind {
+            ReportKind::WorkPrecision => SweepReportKind::WorkPrecision,
+            ReportKind::Convergence => SweepReportKind::Convergence,
+        },
+        measure: report.measure.clone(),
+        against: report.against.clone(),
+        by: report.by.clone(),
+    }
+}
+
+/// The row of a point that was refused before it ran.
+fn refused_row(version: &str) -> PointRow {
+    PointRow {
+        point: 0,
+        replicate: 0,
+        key: String::new(),
+        swept: Vec::new(),
+        seed: 0,
+        status: Status::Failed,
+        error_code: None,
+        error_message: None,
+        wall: 0.0,
+        loop_wall: 0.0,
+        cpu: 0.0,
+        compile_wall: 0.0,
+        write_wall: None,
+        peak_memory: None,
+        particles: 0,
+        step: f64::NAN,
+        duration: f64::NAN,
+        steps: 0,
+        mass_defect: None,
+        values: Vec::new(),
+        version: version.to_owned(),
+        numerics: crate::plan::NUMERICS_VERSION,
+        host: String::new(),
+        threads: 0,
+        started: 0,
+        finished: 0,
+    }
+}

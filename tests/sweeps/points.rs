@@ -1,0 +1,117 @@
+//! Which points run, which do not, and what a user is told of them.
+
+use crate::program::Folder;
+use crate::{facts, scene_with};
+
+const SWEEP: &str = "  D  1e-4 m^2/s, 1e-3 m^2/s\n  c0 1 mol/m^3, 2 mol/m^3, 3 mol/m^3\n  replicates 2";
+
+/// `SWEEP` in a folder of its own, run once.
+fn run_once() -> Folder {
+    let folder = Folder::new();
+    folder.write("s.lam", scene_with(SWEEP));
+    folder.lamella(&["sweep", "s.lam", "--out", "out"]).exits(0).says("12 replicates run");
+    folder
+}
+
+#[test]
+fn cosmetics_are_no_reason_to_run_again() {
+    let folder = run_once();
+    let before = facts(&folder, "out");
+    let edits: [(&str, &str); 6] = [
+        ("# a comment", "# another comment, and more of it"),
+        ("let   w  = 0.5 m", "let w = 50 cm"),
+        ("x < w", "x < width"),
+        ("D  1e-4 m^2/s, 1e-3 m^2/s", "D 1 cm^2/s, 10 cm^2/s"),
+        ("run to 4 s, step 1 s", "run to 4000 ms, step 1 s"),
+        ("output total   A every 2 s", ""),
+    ];
+    let mut text = scene_with(SWEEP);
+    for (from, to) in &edits[..5] {
+        assert!(text.contains(from), "{from}");
+        text = text.replace(from, to);
+    }
+    text = text.replace("(x - w)", "(x - width)").replace("let w = 50 cm", "let width = 50 cm");
+    // The order of statements.
+    text = text.replace("species A \"tracer\"\n", "") + "species A \"tracer\"\n";
+    folder.write("s.lam", &text);
+    folder.lamella(&["sweep", "s.lam", "--out", "out"]).exits(0).says("0 replicates run, 12 known");
+    assert_eq!(facts(&folder, "out"), before);
+    // A change of what is asked for is none of cosmetics.
+    folder.write("s.lam", text.replace(edits[5].0, edits[5].1));
+    folder.lamella(&["sweep", "s.lam", "--out", "out"]).exits(0).says("12 replicates run");
+}
+
+#[test]
+fn a_changed_value_runs_the_points_it_touches() {
+    let folder = run_once();
+    folder.write("s.lam", scene_with(&SWEEP.replace("2 mol/m^3", "2.5 mol/m^3")));
+    folder.lamella(&["sweep", "s.lam", "--out", "out"]).exits(0).says("4 replicates run, 8 known");
+}
+
+#[test]
+fn points_that_are_skipped_or_refused_are_told() {
+    let folder = Folder::new();
+    let sweep = "  step 1 s, 2 s, 4 s\n  particles 100, 1000\n  skip when particles / step > 400 /s";
+    folder.write("s.lam", scene_with(sweep));
+    let done = folder.lamella(&["sweep", "s.lam", "--out", "out"]).exits(0);
+    done.says("4 points, 2 skipped").gives("4 done, 0 failed");
+    // Outside of the parameter's range: refused before it runs, and its row says why.
+    folder.write("r.lam", scene_with("  D 1e-3 m^2/s, 5 m^2/s"));
+    let done = folder.lamella(&["sweep", "r.lam", "--out", "refused"]).exits(1);
+    done.says("1 points are refused before they run").gives("1 done, 1 failed");
+    let points = lamella::table::read::points(&folder.path("refused/points.parquet")).unwrap();
+    assert_eq!(points[1].error_code.as_deref(), Some("P002"), "{:?}", points[1].error_message);
+}
+
+#[test]
+fn failed_points_are_rows_and_run_again() {
+    let folder = Folder::new();
+    folder.write("s.lam", scene_with("  D linspace(1e-4 m^2/s, 1e-3 m^2/s, 60)"));
+    let mut command = folder.command(&["sweep", "s.lam", "--out", "out"]);
+    let bad = crate::program::finish(command.env("LAMELLA_FAULT_EVERY", "5").output().unwrap()).exits(1);
+    let rows = facts(&folder, "out");
+    let failed: Vec<&String> = rows.iter().filter(|row| row.contains("Failed")).collect();
+    assert_eq!(rows.len(), 60);
+    assert!(!failed.is_empty() && failed.len() < 60, "{}", bad.stderr);
+    // Each log has a command that runs the point alone, with the same plan.
+    let logs: Vec<String> = folder.files().into_iter().filter(|name| name.ends_with("/log.txt")).collect();
+    assert_eq!(logs.len(), failed.len());
+    for log in logs.iter().take(3) {
+        let key = log.split('/').nth_back(1).expect("out/failed/KEY/log.txt");
+        let text = folder.read(log);
+        let line = text.lines().find(|line| line.starts_with("lamella run ")).expect("a command");
+        let arguments: Vec<String> =
+            line.split(' ').skip(1).map(|word| word.trim_matches('\'').to_owned()).collect();
+        let mut arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        arguments.extend(["--out", "alone"]);
+        folder.lamella(&arguments).exits(0).gives(key);
+    }
+    folder
+        .lamella(&["sweep", "s.lam", "--out", "out"])
+        .exits(0)
+        .says(&format!("{} replicates run", failed.len()));
+    folder.lamella(&["sweep", "s.lam", "--out", "whole"]).exits(0);
+    crate::assert_same(&folder, "out", "whole");
+}
+
+#[test]
+fn expectations_fail_visibly() {
+    let folder = Folder::new();
+    let sweep = "  D 1e-4 m^2/s, 1e-3 m^2/s\n  expect leak < 1e-12\n  expect err < 1e-9";
+    folder.write("s.lam", scene_with(sweep));
+    let done = folder.lamella(&["sweep", "s.lam", "--out", "out"]).exits(1);
+    let done = done.gives("leak < 1e-12: met (2 replicates)").gives("err < 1e-9: NOT MET (err = ");
+    done.gives("at point 0 (D=0.0001 m^2/s), replicate 0");
+}
+
+#[test]
+fn axes_can_be_given_on_the_command_line() {
+    let folder = Folder::new();
+    folder.write("s.lam", crate::SCENE);
+    let over = ["sweep", "s.lam", "--over", "step=1s,2s", "--over", "D=1e-4 m^2/s .. 4e-4 m^2/s by factor 2"];
+    let done = folder.lamella(&[&over[..], &["--replicates", "2", "--out", "out"]].concat()).exits(0);
+    done.says("6 points").says("12 replicates run");
+    folder.lamella(&["sweep", "s.lam", "--over", "stop=1s"]).exits(2).says("`stop` cannot be swept");
+    folder.lamella(&["sweep", "s.lam"]).exits(2).says("[F120]").says("the scene has no sweep");
+    folder.lamella(&["status", "nowhere"]).exits(2).says("[F121]");
+}
