@@ -16,11 +16,13 @@ use lamella::source::Sources;
 use lamella::units::Dimension;
 
 const SCENARIO_1: &str = "experiments/gramling/gramling.lam";
+/// The scene with every entry of a sweep.
+const SWEEPS: &str = "tests/scenes/sweeps.lam";
 /// Co-prime to the few mutants that each character makes, so that every way of damage is met.
 const STRIDE: usize = 23;
 
 fn stride(name: &str) -> usize {
-    if name == SCENARIO_1 || std::env::var_os("LAMELLA_ALL").is_some() { 1 } else { STRIDE }
+    if [SCENARIO_1, SWEEPS].contains(&name) || std::env::var_os("LAMELLA_ALL").is_some() { 1 } else { STRIDE }
 }
 
 /// How well the first message of an invalid mutant points.

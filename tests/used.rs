@@ -131,11 +131,11 @@ fn each_of_two_used_scenes_has_its_own_statements() {
 }
 
 fn measures(file: &File) -> Vec<&str> {
-    let name = |kind| match kind {
-        &StatementKind::Measure(ref measure) => Some(measure.name.value.as_str()),
+    let of_measures = file.statements.iter().filter_map(|statement| match &statement.kind {
+        StatementKind::Measure(measure) => Some(measure.name.value.as_str()),
         _ => None,
-    };
-    file.statements.iter().filter_map(|statement| name(&statement.kind)).collect()
+    });
+    of_measures.collect()
 }
 
 /// A mistake in the scene of the second sweep stops the whole, once.

@@ -47,6 +47,11 @@ const FACTS: &[(&str, Variable, Dimension)] = &[
     ("mass_defect", Variable::MassDefect, Dimension::NONE),
 ];
 
+/// Whether a name is that of a size, or of what a run tells of itself.
+pub(super) fn is_fact(name: &str) -> bool {
+    SIZES.iter().chain(FACTS).any(|(word, ..)| *word == name)
+}
+
 /// The names that conditions of a sweep know.
 pub(super) struct Known {
     variables: Vec<Variable>,

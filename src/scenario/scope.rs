@@ -142,6 +142,11 @@ impl<'a> Scope<'a> {
         self.undefined.entry(name.to_owned()).or_default().insert(span);
     }
 
+    /// Whether something else uses a name that does not exist.
+    pub(super) fn is_undefined(&self, name: &str) -> bool {
+        self.undefined.contains_key(name)
+    }
+
     /// One message per undefined name, at its first use or at the definition that is misspelt.
     pub(super) fn report_undefined(&self, axes: &[String], diagnostics: &mut Vec<Diagnostic>) {
         for (name, uses) in &self.undefined {

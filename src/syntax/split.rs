@@ -157,7 +157,7 @@ fn looks_like_statement(lexed: Lexed, idx: usize) -> bool {
 
 /// Whether a line that begins with this token goes on with the statement before it: no statement
 /// begins with a symbol or with a reserved word. A line that begins with a closing bracket does too.
-fn continues_before(lexed: Lexed, idx: usize) -> bool {
+pub fn continues_before(lexed: Lexed, idx: usize) -> bool {
     match lexed.kind(idx) {
         Some(TokenKind::Symbol) => true,
         Some(TokenKind::Word) => RESERVED_WORDS.contains(&lexed.slice(idx)),
@@ -166,7 +166,7 @@ fn continues_before(lexed: Lexed, idx: usize) -> bool {
 }
 
 /// Whether a line that ends with this token cannot be the end of its statement.
-fn continues_after(lexed: Lexed, idx: usize) -> bool {
+pub fn continues_after(lexed: Lexed, idx: usize) -> bool {
     let word = lexed.slice(idx);
     match lexed.kind(idx) {
         Some(TokenKind::Symbol) => !matches!(word, ")" | "}" | "]" | "%" | "‰" | ";" | ":"),

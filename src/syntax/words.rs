@@ -37,6 +37,9 @@ pub const LATER_KEYWORDS: &[&str] = &["medium", "source", "kernel", "data", "che
 /// Statements whose body in braces may hold what looks like statements.
 pub const BODY_KEYWORDS: &[&str] = &["sweep"];
 
+/// The first words of the entries of a sweep that are not axes.
+pub const SWEEP_ENTRIES: &[&str] = &["replicates", "seed", "common_random_numbers", "skip", "expect", "zip"];
+
 /// Words that can be neither names nor units, wherever they stand.
 pub const RESERVED_WORDS: &[&str] = &[
     "if", "then", "else", "and", "or", "not", "in", "at", "every", "along", "on", "over", "for", "until",

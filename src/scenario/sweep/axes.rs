@@ -10,6 +10,7 @@ use crate::diagnostic::codes::{W001, W002, W003};
 use crate::diagnostic::{Diagnostic, did_you_mean};
 use crate::source::{Span, Spanned};
 use crate::syntax::tree::{self, ExprKind, SweepValue};
+use crate::syntax::words::SWEEP_ENTRIES;
 use crate::units::Dimension;
 
 /// Values that one axis may have.
@@ -17,7 +18,6 @@ const MAX_VALUES: f64 = 1e6;
 
 pub(super) fn zip<'a>(
     checker: &mut Checker<'a>,
-    span: Span,
     axes: &'a [tree::SweepAxis],
     parameters: &[Parameter],
 ) -> Option<Vec<SweepAxis>> {
@@ -25,18 +25,27 @@ pub(super) fn zip<'a>(
         axes.iter().map(|written| axis(checker, written, parameters)).collect();
     let group: Vec<SweepAxis> = group.into_iter().collect::<Option<_>>()?;
     let first = group.first()?;
-    let Some(other) = group.iter().find(|axis| axis.values.len() != first.values.len()) else {
+    let Some(at) = group.iter().position(|axis| axis.values.len() != first.values.len()) else {
         return Some(group);
     };
+    let other = &group[at];
     checker.report(
         Diagnostic::error(W003, "axes that go together need equally many values")
-            .at(other.span, format!("{} values", other.values.len()))
-            .also(first.span, format!("{} values", first.values.len()))
-            .also(span, "zipped here")
+            .at(whole_span(&axes[at]), format!("{} values", other.values.len()))
+            .also(whole_span(&axes[0]), format!("{} values", first.values.len()))
             .found(format!("{} values", other.values.len()))
             .expected(format!("{} values", first.values.len())),
     );
     None
+}
+
+/// From the name of an axis to its last value.
+fn whole_span(axis: &tree::SweepAxis) -> Span {
+    let last = axis.values.last().map_or(axis.target.span, |value| match value {
+        SweepValue::One(expr) => expr.span,
+        SweepValue::Progression { span, .. } => *span,
+    });
+    axis.target.span.to(last)
 }
 
 pub(super) fn axis<'a>(
@@ -93,6 +102,11 @@ fn target(
     if let Some((_, target)) = words.iter().find(|(word, _)| *word == name.value) {
         return Some((target.clone(), Dimension::NONE));
     }
+    if checker.scope.is_undefined(&name.value) {
+        // The definition may be what is misspelt: all uses of the name decide together.
+        checker.scope.note_undefined(&name.value, name.span);
+        return None;
+    }
     let known: Vec<&str> =
         parameters.iter().map(|it| it.name.as_str()).chain(words.iter().map(|(word, _)| *word)).collect();
     let mut message = Diagnostic::error(W001, format!("`{}` cannot be swept", name.value))
@@ -102,11 +116,24 @@ fn target(
     if let Some(entry) = checker.scope.get(&name.value) {
         message = message.also(entry.span, format!("this is {}", entry.origin.describe()));
         message = message.help("write it as `param`, and it can be swept");
-    } else if let Some(candidate) = did_you_mean(&name.value, known) {
+    } else if let Some(help) = entry_help(&name.value) {
+        message = message.help(help);
+    } else if let Some(candidate) =
+        did_you_mean(&name.value, known.into_iter().chain(SWEEP_ENTRIES.iter().copied()))
+    {
         message = message.help(format!("did you mean `{candidate}`?"));
     }
     checker.report(message);
     None
+}
+
+/// An entry of another kind that is written as an axis would be.
+fn entry_help(name: &str) -> Option<&'static str> {
+    match name {
+        "skip" => Some("write `skip when CONDITION`"),
+        "seed" => Some("a seed is a whole number, such as `seed 42`"),
+        _ => None,
+    }
 }
 
 /// The values of one item of a list.

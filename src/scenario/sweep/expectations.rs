@@ -2,7 +2,8 @@
 
 use super::super::Measure;
 use super::super::check::Checker;
-use super::super::condition::{Condition, Known};
+use super::super::condition::{Condition, Known, is_fact};
+use super::super::scope::Origin;
 use super::{ExpectKind, Replicates, Target, Until};
 use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::W001;
@@ -55,6 +56,16 @@ pub(super) fn measure_name(
     name: &tree::Name,
     measures: &[Measure],
 ) -> Option<String> {
+    match checker.scope.get(&name.value).map(|entry| entry.origin) {
+        // A measure that is wrong has been reported where it stands.
+        Some(Origin::Measure) if measures.iter().all(|measure| measure.name != name.value) => return None,
+        // The definition may be what is misspelt: all uses of the name decide together.
+        None if !is_fact(&name.value) => {
+            checker.scope.note_undefined(&name.value, name.span);
+            return None;
+        }
+        _ => {}
+    }
     let words: Vec<(&str, ())> = measures.iter().map(|measure| (measure.name.as_str(), ())).collect();
     checker.word(name, "a measure of the scene", &words)?;
     if let Some(entry) = checker.scope.get_mut(&name.value) {

@@ -188,7 +188,7 @@ fn sweep<'a>(
             SweepEntry::Axis(written) => {
                 sweep.groups.extend(axis(checker, written, parameters).map(|axis| vec![axis]));
             }
-            SweepEntry::Zip(span, axes) => sweep.groups.extend(zip(checker, *span, axes, parameters)),
+            SweepEntry::Zip(_, axes) => sweep.groups.extend(zip(checker, axes, parameters)),
             SweepEntry::Seed(seed) => sweep.seed = Some(seed.value),
             SweepEntry::Common(_) => sweep.has_common_numbers = true,
             SweepEntry::Replicates(written) => {

@@ -87,7 +87,10 @@ impl Stop<'_> {
         let (span, message, label) = match self.neighbours() {
             Some((span, message)) => (span, message, format!("expected {expected} here")),
             None if self.at.is_none() => {
-                let message = "this statement ends too early".to_owned();
+                let message = match self.is_entry {
+                    true => "this entry ends too early".to_owned(),
+                    false => "this statement ends too early".to_owned(),
+                };
                 (self.place(), message, format!("after this, expected {expected}"))
             }
             None => {

@@ -4,6 +4,7 @@
 //! `words`, `diagnostic`, the symbols of `units`.
 //! It deliberately blames one token per statement: what follows a first mistake is guesswork.
 
+mod entry;
 mod expected;
 mod junction;
 
@@ -21,17 +22,7 @@ use pest::error::{Error, ErrorVariant, InputLocation};
 
 /// The message for a statement that the grammar refused.
 pub fn complain(lexed: Lexed, chunk: &Chunk, error: &Error<Rule>) -> Diagnostic {
-    let stop = Stop::find(lexed, chunk, error);
-    None.or_else(|| stop.detached_fraction())
-        .or_else(|| stop.broken_unit())
-        .or_else(|| stop.misspelt_word())
-        .or_else(|| stop.open_bracket())
-        .or_else(|| stop.lone_bracket())
-        .or_else(|| stop.lone_branch())
-        .or_else(|| stop.arguments_without_function())
-        .or_else(|| stop.missing_kind())
-        .or_else(|| stop.late_clause())
-        .unwrap_or_else(|| stop.plain())
+    entry::complain_about_entry(lexed, chunk).unwrap_or_else(|| Stop::find(lexed, chunk, error).complain())
 }
 
 /// The significant tokens around the place where the grammar stopped.
@@ -42,9 +33,24 @@ struct Stop<'t> {
     /// The token at the stop; none at the end of the statement.
     at: Option<usize>,
     expected: Vec<Rule>,
+    /// Whether this is an entry of a statement, not the whole of it.
+    is_entry: bool,
 }
 
 impl<'t> Stop<'t> {
+    fn complain(&self) -> Diagnostic {
+        None.or_else(|| self.detached_fraction())
+            .or_else(|| self.broken_unit())
+            .or_else(|| self.misspelt_word())
+            .or_else(|| self.open_bracket())
+            .or_else(|| self.lone_bracket())
+            .or_else(|| self.lone_branch())
+            .or_else(|| self.arguments_without_function())
+            .or_else(|| self.missing_kind())
+            .or_else(|| self.late_clause())
+            .unwrap_or_else(|| self.plain())
+    }
+
     fn find(lexed: Lexed<'t>, chunk: &Chunk, error: &Error<Rule>) -> Self {
         let offset = lexed.tokens[chunk.first].span.start as usize;
         let position = match error.location {
@@ -57,7 +63,7 @@ impl<'t> Stop<'t> {
             ErrorVariant::ParsingError { positives, .. } => positives.clone(),
             ErrorVariant::CustomError { .. } => Vec::new(),
         };
-        Self { lexed, before, at: after.first().copied(), expected }
+        Self { lexed, before, at: after.first().copied(), expected, is_entry: false }
     }
 
     fn word(&self, idx: usize) -> &'t str {
@@ -89,7 +95,11 @@ impl<'t> Stop<'t> {
     }
 
     fn found(&self) -> String {
-        self.at.map_or_else(|| "the end of the statement".to_owned(), |idx| quoted(self.word(idx)))
+        self.at.map_or_else(|| self.end().to_owned(), |idx| quoted(self.word(idx)))
+    }
+
+    fn end(&self) -> &'static str {
+        if self.is_entry { "the end of the entry" } else { END }
     }
 
     /// What could follow, each once; what makes up a value is not listed beside it.
@@ -104,7 +114,7 @@ impl<'t> Stop<'t> {
             }
         }
         if self.expected.contains(&Rule::EOI) {
-            shown.push(END.to_owned());
+            shown.push(self.end().to_owned());
         }
         join_words(&shown)
     }
@@ -140,6 +150,11 @@ impl<'t> Stop<'t> {
         let (number, unit) = self.unit_before()?;
         let unit_text = &self.lexed.text[unit.range()];
         if !unit_text.starts_with('/') && !unit_text.contains('/') && !is_unit_symbol(symbol_of(unit_text)) {
+            if self.is_entry
+                && let Some(word) = self.before.last().and_then(|&last| self.misspelt(last))
+            {
+                return Some(word);
+            }
             let diagnostic = Diagnostic::error(codes::S014, format!("{} is not a unit", quoted(unit_text)))
                 .at(unit, "a word right after a number is its unit")
                 .found(quoted(unit_text))
