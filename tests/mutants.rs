@@ -7,22 +7,25 @@
 mod damage;
 
 use damage::mutants::{self, Mutant};
-use damage::{messages, messages_of_syntax, shipped_scenes};
+use damage::{messages, messages_of_syntax, shipped_scenes, sources};
 use lamella::check;
 use lamella::diagnostic::{Diagnostic, any_fatal};
 use lamella::plan::compile::Options;
 use lamella::scenario::{Settings, Species};
-use lamella::source::Sources;
 use lamella::units::Dimension;
 
 const SCENARIO_1: &str = "experiments/gramling/gramling.lam";
-/// The scene with every entry of a sweep.
-const SWEEPS: &str = "tests/scenes/sweeps.lam";
+/// The scenes with every entry of a sweep, and with names of a used scene.
+const SWEEPS: [&str; 2] = ["tests/scenes/sweeps.lam", "tests/scenes/study.lam"];
 /// Co-prime to the few mutants that each character makes, so that every way of damage is met.
 const STRIDE: usize = 23;
 
 fn stride(name: &str) -> usize {
-    if [SCENARIO_1, SWEEPS].contains(&name) || std::env::var_os("LAMELLA_ALL").is_some() { 1 } else { STRIDE }
+    if name == SCENARIO_1 || SWEEPS.contains(&name) || std::env::var_os("LAMELLA_ALL").is_some() {
+        1
+    } else {
+        STRIDE
+    }
 }
 
 /// How well the first message of an invalid mutant points.
@@ -134,7 +137,7 @@ fn the_first_message_of_the_syntax_points_at_the_damaged_token() {
 /// Whether every species of a valid scene is counted in mass. The shipped scenes count in moles and give
 /// the dimension of concentrations in one place, `c0`: with `mg/L` there they are right again.
 fn is_all_in_mass(text: &str) -> bool {
-    let checked = check(Sources::single("scene.lam", text), &Settings::default(), &Options::default());
+    let checked = check(sources(text), &Settings::default(), &Options::default());
     let is_mass = |species: &Species| species.dimension == Dimension::MASS_CONCENTRATION;
     checked.scenario.is_some_and(|scenario| scenario.species.iter().all(is_mass))
 }

@@ -42,6 +42,22 @@ impl<'t> Lexed<'t> {
         (idx..self.tokens.len()).find(|&idx| self.is_significant(idx))
     }
 
+    /// The last significant token before `idx`.
+    pub fn last_significant(&self, idx: usize) -> Option<usize> {
+        (0..idx.min(self.tokens.len())).rev().find(|&idx| self.is_significant(idx))
+    }
+
+    /// Whether an entry of a sweep begins with the token `idx`, which is the first of its line or follows
+    /// a semicolon or a brace.
+    pub fn begins_entry(&self, idx: usize) -> bool {
+        let Some(last) = self.last_significant(idx) else { return false };
+        if matches!(self.slice(last), ";" | "{") {
+            return true;
+        }
+        let is_line_start = (last..idx).any(|idx| self.kind(idx) == Some(TokenKind::Newline));
+        is_line_start && !continues_after(*self, last) && !continues_before(*self, idx)
+    }
+
     /// The first significant token at or after `idx` that stands before a line end.
     fn next_on_line(&self, idx: usize) -> Option<usize> {
         (idx..self.tokens.len())

@@ -39,9 +39,19 @@ pub fn shipped_scenes() -> Vec<(String, String)> {
     scenes
 }
 
+/// The file that one of the scenes uses.
+const USED: (&str, &str) = ("used/column.lam", include_str!("../scenes/used/column.lam"));
+
+/// A text as a scene, with the file that it may use.
+pub fn sources(text: &str) -> Sources {
+    let mut sources = Sources::single("scene.lam", text);
+    sources.add(USED.0, USED.1);
+    sources
+}
+
 /// Everything that `check` says about a text, in its order.
 pub fn messages(text: &str) -> Vec<Diagnostic> {
-    lamella::check(Sources::single("scene.lam", text), &Settings::default(), &Options::default()).diagnostics
+    lamella::check(sources(text), &Settings::default(), &Options::default()).diagnostics
 }
 
 /// What the syntax alone says about a text.

@@ -59,6 +59,19 @@ fn blanks_become_regular() {
 }
 
 #[test]
+fn comments_inside_a_sweep_stay_where_they_belong() {
+    let text = "sweep s {\n# first\n  step 1 s,2 s   # why\n      zip {\n# second\n bins 1,2 # here\n\n\n  \
+                D 1,2\n}   # zipped\n  # last\n}\n# after\n";
+    let expected = "sweep s {\n  # first\n  step 1 s, 2 s  # why\n  zip {\n    # second\n    bins 1, 2  # here\n\n    \
+                    D 1, 2\n  }  # zipped\n  # last\n}\n# after\n";
+    assert_eq!(formatted(text), expected);
+    assert_eq!(formatted(expected), expected);
+    // A line that goes on with its list is indented by what is open, and stays a line.
+    let text = "sweep s {\nstep 1 s,\n2 s, # more\n3 s\n}\n";
+    assert_eq!(formatted(text), "sweep s {\n  step 1 s,\n    2 s,  # more\n    3 s\n}\n");
+}
+
+#[test]
 fn broken_statements_stay_as_they_are() {
     let text = "let  a =\nlet  b  =  ( 2\n  # inside\n   3 )\nlet c =  1\n";
     assert_eq!(formatted(text), "let  a =\nlet  b  =  ( 2\n  # inside\n   3 )\nlet c = 1\n");

@@ -29,6 +29,8 @@ fn scenes() -> Vec<(String, String)> {
 
 /// Scenario 1 of the language description, as it stands there.
 const GRAMLING: &str = include_str!("../scenes/gramling_column.lam");
+/// Sweeps with every kind of entry.
+const SWEEPS: &str = include_str!("../scenes/sweeps.lam");
 /// Every form that a statement may take.
 const FORMS: &str = include_str!("forms/every_statement_form.lam");
 

@@ -1,7 +1,7 @@
 //! Any text: no panic, no lost character, a layout that is a fixed point.
 
 use crate::format::formatted;
-use crate::{FORMS, GRAMLING, messages_of, shape};
+use crate::{FORMS, GRAMLING, SWEEPS, messages_of, shape};
 use lamella::source::FileId;
 use lamella::syntax::parse;
 use proptest::prelude::*;
@@ -22,7 +22,16 @@ const PIECES: &[&str] = &[
     "measure",
     "reference",
     "dispersion",
+    "use",
     "sweep",
+    "sweep s {",
+    "zip {",
+    "replicates",
+    "until",
+    "skip when",
+    "expect",
+    "by",
+    "report",
     "a",
     "x",
     "t",
@@ -88,11 +97,11 @@ fn soup() -> impl Strategy<Value = String> {
     proptest::collection::vec(proptest::sample::select(PIECES), 0..60).prop_map(|pieces| pieces.concat())
 }
 
-/// Scenario 1 with a few of its characters replaced by pieces.
-fn mutated() -> impl Strategy<Value = String> {
-    let edit = (0..GRAMLING.len(), 0..12_usize, proptest::sample::select(PIECES));
+/// A scene with a few of its characters replaced by pieces.
+fn mutated(scene: &'static str) -> impl Strategy<Value = String> {
+    let edit = (0..scene.len(), 0..12_usize, proptest::sample::select(PIECES));
     proptest::collection::vec(edit, 1..6).prop_map(|edits| {
-        let mut text = GRAMLING.to_owned();
+        let mut text = scene.to_owned();
         for (at, n_removed, piece) in edits {
             let start = (0..=at.min(text.len())).rev().find(|&idx| text.is_char_boundary(idx)).unwrap_or(0);
             let end = (start + n_removed).min(text.len());
@@ -162,7 +171,12 @@ proptest! {
     }
 
     #[test]
-    fn any_mutation(text in mutated()) {
+    fn any_mutation(text in mutated(GRAMLING)) {
+        check_any(&text);
+    }
+
+    #[test]
+    fn any_mutation_of_sweeps(text in mutated(SWEEPS)) {
         check_any(&text);
     }
 }
@@ -172,7 +186,7 @@ proptest! {
 
     #[test]
     fn blanks_and_comments_mean_nothing(seed in proptest::collection::vec(any::<u8>(), 1..50)) {
-        for scene in [GRAMLING, FORMS] {
+        for scene in [GRAMLING, SWEEPS, FORMS] {
             let text = perturbed(&seed, scene);
             prop_assert_eq!(messages_of(&text), []);
             prop_assert_eq!(shape(&text), shape(scene));
@@ -209,6 +223,13 @@ fn deep_and_long_texts_are_refused() {
             let (file, _) = parse(FileId(0), &text);
             assert!(file.statements.len() <= 2);
             check_any(&text);
+        }
+    }
+    let entries = ["zip {", "a 1\n", "a (\n", "skip when (", "expect\n", "a 1 .. 2 by\n", ";", "}"];
+    for entry in entries {
+        for n in [100, 1_000, 5_000] {
+            check_any(&format!("lamella 1\nsweep s {{\n{}", entry.repeat(n)));
+            check_any(&format!("lamella 1\nsweep s {{\n{}\n}}", entry.repeat(n)));
         }
     }
     check_any("1e999 .5 1. ..");

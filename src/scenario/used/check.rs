@@ -146,6 +146,10 @@ pub(super) fn sweeps_of(file: &File, wanted: &[&Use]) -> Vec<Diagnostic> {
     for sweep in sweeps(file) {
         match &sweep.of {
             Some(of) if !aliases.contains(&of.value.as_str()) => {
+                if let Some(message) = misspelt_alias(file, wanted, &of.value, of.span) {
+                    messages.push(message);
+                    continue;
+                }
                 let mut message = Diagnostic::error(W001, format!("`{}` is no used scene", of.value))
                     .at(of.span, "no such scene")
                     .found(format!("`{}`", of.value));
@@ -191,6 +195,26 @@ pub(super) fn sweeps_of(file: &File, wanted: &[&Use]) -> Vec<Diagnostic> {
         }
     }
     messages
+}
+
+/// The alias to blame for one that does not exist: one that nothing uses and that differs by a slip, while
+/// the other is written the same in several places.
+fn misspelt_alias(file: &File, wanted: &[&Use], meant: &str, first_use: Span) -> Option<Diagnostic> {
+    let n_uses = |alias: &str| {
+        let speaks = |statement| Mentions::of(statement, [alias].into()).scenes.contains_key(alias);
+        file.statements.iter().filter(|statement| speaks(statement)).count()
+            + sweeps(file).filter(|sweep| sweep.of.as_ref().is_some_and(|of| of.value == alias)).count()
+    };
+    let candidate = did_you_mean(meant, wanted.iter().map(|it| it.alias.value.as_str()))?;
+    let written = wanted.iter().find(|it| it.alias.value == candidate)?;
+    (n_uses(meant) > 1 && n_uses(candidate) == 0).then(|| {
+        Diagnostic::error(W001, format!("`{meant}` is no used scene, and nothing uses `{candidate}`"))
+            .at(written.alias.span, format!("did you mean `{meant}`?"))
+            .also(first_use, "no such scene")
+            .found(format!("`{candidate}`"))
+            .expected(format!("`{meant}`"))
+            .help(format!("call it `{meant}` here, or use `{candidate}` there"))
+    })
 }
 
 /// A statement that speaks of two used scenes belongs to neither.

@@ -45,6 +45,17 @@ pub fn zone_columns(words: &[&str]) -> Option<Columns> {
     Some(Columns { group: "zone", stops })
 }
 
+/// The column of an entry of a sweep: after its first word; the axes of a zip have their own.
+pub fn entry_columns(words: &[&str], is_zipped: bool) -> Option<Columns> {
+    let mut value = 1;
+    while words.get(value) == Some(&".") {
+        value += 2;
+    }
+    let has_value = words.get(value).is_some_and(|word| !matches!(*word, "{" | ";"));
+    let group = if is_zipped { "zipped" } else { "entry" };
+    has_value.then(|| Columns { group, stops: vec![(0, value)] })
+}
+
 fn is_species_list(words: &[&str]) -> bool {
     words.get(2).is_some_and(|word| !super::super::words::RESERVED_WORDS.contains(word))
 }

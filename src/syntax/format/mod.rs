@@ -107,6 +107,10 @@ impl<'t> Reader<'_, 't> {
         }
     }
 
+    fn is_sweep(&self, chunk: Option<&Chunk>) -> bool {
+        chunk.is_some_and(|chunk| self.lexed.slice(chunk.first) == "sweep")
+    }
+
     fn has_parsed(&self, chunk: &Chunk) -> bool {
         let start = self.lexed.tokens[chunk.first].span.start;
         self.file.statements.binary_search_by_key(&start, |statement| statement.span.start).is_ok()
@@ -130,6 +134,12 @@ impl<'t> Reader<'_, 't> {
         match self.open.len() - usize::from(closes && !self.open.is_empty()) {
             0 if closes => 0,
             0 => 2,
+            // A list that goes on is no entry of its own.
+            n_open
+                if self.is_sweep(chunk) && !closes && !first.is_empty() && !self.lexed.begins_entry(idx) =>
+            {
+                2 * n_open + 2
+            }
             n_open => 2 * n_open,
         }
     }
@@ -148,6 +158,11 @@ impl<'t> Reader<'_, 't> {
         let words: Vec<&str> = pieces.iter().map(|(_, text)| *text).collect();
         let columns = match (is_begin, is_end) {
             (true, true) => columns_of(&words),
+            (false, _) if self.is_sweep(chunk) => {
+                let is_entry = line.first().is_some_and(|&first| self.lexed.begins_entry(first));
+                let is_zipped = self.open.len() > 1;
+                is_entry.then(|| align::entry_columns(&words, is_zipped)).flatten()
+            }
             (false, _) if self.open == ["{"] => align::zone_columns(&words),
             _ => None,
         };

@@ -65,7 +65,11 @@ impl<'t> Pair<'_, 't> {
         match self.lexed.kind(self.line[before]) {
             Some(TokenKind::Symbol) => !matches!(word, ")" | "]" | "}") && !self.marks[before],
             Some(TokenKind::Word) => {
-                !self.marks[before] && (RESERVED_WORDS.contains(&word) || BEFORE_VALUE.contains(&word))
+                let is_before_value = RESERVED_WORDS.contains(&word)
+                    || BEFORE_VALUE.contains(&word)
+                    || (self.lexed.slice(self.keyword) == "sweep"
+                        && self.lexed.begins_entry(self.line[before]));
+                !self.marks[before] && is_before_value
             }
             _ => false,
         }
