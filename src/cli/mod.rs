@@ -15,6 +15,7 @@ mod new;
 mod plan;
 mod progress;
 mod record;
+mod report;
 mod run;
 mod summary;
 mod sweep;
@@ -78,6 +79,7 @@ enum Command {
     Sweep(sweep::Arguments),
     Gather(sweep_folder::GatherArguments),
     Status(sweep_folder::StatusArguments),
+    Report(report::Arguments),
     Explain(explain::Arguments),
     Completions(completions::Arguments),
 }
@@ -119,6 +121,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Sweep(sweep) => sweep::run(sweep, &terminal),
         Command::Gather(gather) => sweep_folder::gather(gather, &terminal),
         Command::Status(status) => sweep_folder::status(status, &terminal),
+        Command::Report(report) => report::run(report, &terminal),
         Command::New(new) => new::run(new, &terminal),
         Command::Explain(explain) => explain::run(explain, &terminal),
         Command::Completions(completions) => completions::run(completions, &terminal),

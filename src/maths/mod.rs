@@ -10,4 +10,5 @@ pub mod pentadiagonal;
 pub mod quadrature;
 pub mod scalar;
 pub mod special;
+pub mod student;
 pub mod wide;

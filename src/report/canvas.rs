@@ -97,6 +97,14 @@ impl Canvas<'_> {
         self.backend.draw_rect(fine(corner), fine(opposite), &pen.style(true), true).expect(IN_MEMORY);
     }
 
+    /// A filled area.
+    pub fn area(&mut self, corners: &[(f64, f64)], pen: Pen) {
+        if corners.len() > 2 {
+            let corners = corners.iter().map(|corner| fine(*corner));
+            self.backend.fill_polygon(corners, &pen.style(true)).expect(IN_MEMORY);
+        }
+    }
+
     pub fn letters(&mut self, text: &str, at: (f64, f64), lettering: Lettering) {
         let Rgb(r, g, b) = lettering.color;
         let turn = if lettering.is_upright { FontTransform::Rotate270 } else { FontTransform::None };

@@ -36,17 +36,29 @@ pub fn figure(plan: &Plan, record: &Record, snapshots: &[Snapshot], curves: &[Cu
         2 | 4 => 2,
         _ => 3,
     };
+    sheet(Some(&title(record, n_left_out)), story.key(), &panels, PANEL, n_columns)
+}
+
+/// Panels of one size in rows under a title and one key.
+pub fn sheet(
+    title: Option<&str>,
+    key: Vec<KeyEntry>,
+    panels: &[Panel],
+    panel: (f64, f64),
+    n_columns: usize,
+) -> String {
     let n_rows = panels.len().div_ceil(n_columns).max(1);
-    let width = n_columns as f64 * PANEL.0 + 2.0 * MARGIN;
-    let key = wrapped(story.key(), width - 2.0 * MARGIN);
-    let head = MARGIN + TITLE_HEIGHT + KEY_ROW * key.len() as f64;
-    let height = head + n_rows as f64 * PANEL.1 + MARGIN;
+    let width = n_columns as f64 * panel.0 + 2.0 * MARGIN;
+    let key = wrapped(key, width - 2.0 * MARGIN);
+    let title_height = if title.is_some() { TITLE_HEIGHT } else { 0.0 };
+    let head = MARGIN + title_height + KEY_ROW * key.len() as f64;
+    let height = head + n_rows as f64 * panel.1 + MARGIN;
     page((width, height), |canvas| {
-        write_head(canvas, &title(record, n_left_out), &key);
-        for (idx, panel) in panels.iter().enumerate() {
-            let left = MARGIN + (idx % n_columns) as f64 * PANEL.0;
-            let top = head + (idx / n_columns) as f64 * PANEL.1;
-            draw(canvas, panel, Frame { left, top, right: left + PANEL.0, bottom: top + PANEL.1 });
+        write_head(canvas, title, &key);
+        for (idx, one) in panels.iter().enumerate() {
+            let left = MARGIN + (idx % n_columns) as f64 * panel.0;
+            let top = head + (idx / n_columns) as f64 * panel.1;
+            draw(canvas, one, Frame { left, top, right: left + panel.0, bottom: top + panel.1 });
         }
         if panels.is_empty() {
             let text = "This run has no output that can be drawn.";
@@ -88,10 +100,14 @@ fn wrapped(key: Vec<KeyEntry>, width: f64) -> Vec<Vec<KeyEntry>> {
     rows
 }
 
-fn write_head(canvas: &mut Canvas, title: &str, key: &[Vec<KeyEntry>]) {
-    canvas.letters(title, (MARGIN + 6.0, MARGIN), lettering(16.0, HPos::Left, VPos::Top));
+fn write_head(canvas: &mut Canvas, title: Option<&str>, key: &[Vec<KeyEntry>]) {
+    let mut top = MARGIN;
+    if let Some(title) = title {
+        canvas.letters(title, (MARGIN + 6.0, MARGIN), lettering(16.0, HPos::Left, VPos::Top));
+        top += TITLE_HEIGHT;
+    }
     for (row, entries) in key.iter().enumerate() {
-        let mut at = (MARGIN + 6.0, MARGIN + TITLE_HEIGHT + KEY_ROW * (row as f64 + 0.4));
+        let mut at = (MARGIN + 6.0, top + KEY_ROW * (row as f64 + 0.4));
         for entry in entries {
             at.0 += draw_entry(canvas, entry, at);
         }

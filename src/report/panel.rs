@@ -4,9 +4,11 @@
 //! deliberately knows no species: texts and numbers come ready.
 
 use super::canvas::{Canvas, Lettering, Pattern, Pen, text_width};
+use super::clip;
 use super::color::{GRID, INK, Rgb, WHITE};
 use super::heat::Heat;
-use super::scale::Scale;
+use super::notes::{self, Note};
+use super::scale::{Scale, Spacing};
 use plotters::style::text_anchor::{HPos, VPos};
 
 /// How the points of a mark are shown.
@@ -14,6 +16,33 @@ use plotters::style::text_anchor::{HPos, VPos};
 pub enum Look {
     Dots,
     Line(Pattern),
+    /// Shapes, so that series are told apart without colour, too.
+    Marker(Shape),
+    /// Error bars: each pair of points is the low and the high end of one.
+    Bars,
+    /// A filled area; the points are its outline.
+    Band,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shape {
+    Circle,
+    Square,
+    Triangle,
+    Diamond,
+}
+
+impl Shape {
+    pub const ALL: [Self; 4] = [Self::Circle, Self::Square, Self::Triangle, Self::Diamond];
+
+    fn draw(self, canvas: &mut Canvas, (x, y): (f64, f64), pen: Pen) {
+        match self {
+            Self::Circle => canvas.dot((x, y), 3.2, pen),
+            Self::Square => canvas.rectangle((x - 2.9, y - 2.9), (x + 2.9, y + 2.9), pen),
+            Self::Triangle => canvas.area(&[(x, y - 4.0), (x + 3.8, y + 2.8), (x - 3.8, y + 2.8)], pen),
+            Self::Diamond => canvas.area(&[(x, y - 4.3), (x + 4.3, y), (x, y + 4.3), (x - 4.3, y)], pen),
+        }
+    }
 }
 
 /// A series in the units of the axes.
@@ -43,6 +72,8 @@ pub struct Panel {
     pub heat: Option<Heat>,
     /// Only where the page's key does not tell the series apart.
     pub key: Vec<KeyEntry>,
+    /// Texts beside points; those for which there is no room are left out, the last first.
+    pub notes: Vec<Note>,
 }
 
 /// Left, top, right, bottom on the page.
@@ -69,7 +100,7 @@ impl Frame {
     }
 }
 
-const SMALL: f64 = 11.0;
+pub const SMALL: f64 = 11.0;
 const MIDDLE: f64 = 12.0;
 
 /// Letters in the ink of axes.
@@ -83,7 +114,7 @@ pub fn draw(canvas: &mut Canvas, panel: &Panel, outer: Frame) {
     let y_ticks = panel.y.ticks(5);
     let inner = Frame {
         left: outer.left + left_margin(&y_ticks),
-        top: outer.top + 28.0,
+        top: outer.top + if panel.title.is_empty() { 12.0 } else { 28.0 },
         right: outer.right - 14.0 - color_bar,
         bottom: outer.bottom - 44.0,
     };
@@ -99,6 +130,7 @@ pub fn draw(canvas: &mut Canvas, panel: &Panel, outer: Frame) {
     }
     axes(canvas, panel, &ticks, inner);
     labels(canvas, panel, inner, outer);
+    notes::draw(canvas, panel, inner);
     key(canvas, panel, inner);
 }
 
@@ -159,12 +191,45 @@ fn draw_mark(canvas: &mut Canvas, panel: &Panel, mark: &Mark, frame: Frame) {
             }
         }
         Look::Line(pattern) => {
-            let points: Vec<_> = mark.points.iter().map(place).collect();
+            let mut points: Vec<_> = mark.points.iter().map(place).collect();
+            // A straight line may point out of the panel; a curve is covered by its scale.
+            if let [a, b] = points[..] {
+                points = clip::segment(a, b, frame).to_vec();
+            }
             // A value that is missing or that a log axis cannot show interrupts the line.
             for piece in points.split(|point| !is_drawable(point)) {
                 canvas.broken_line(piece, pattern, Pen::new(mark.color, 1.3));
             }
         }
+        Look::Marker(shape) => {
+            for point in mark.points.iter().map(place).filter(is_drawable) {
+                shape.draw(canvas, point, Pen::new(mark.color, 0.0));
+            }
+        }
+        Look::Bars => {
+            for bar in mark.points.chunks_exact(2) {
+                draw_bar(canvas, place(&bar[0]), place(&bar[1]), mark.color, frame);
+            }
+        }
+        Look::Band => {
+            let outline: Vec<_> = mark.points.iter().map(place).collect();
+            canvas.area(&clip::area(&outline, frame), Pen { opacity: 0.2, ..Pen::new(mark.color, 0.0) });
+        }
+    }
+}
+
+/// From the low to the high end, with caps; a low end that a log axis cannot show lies on the axis.
+fn draw_bar(canvas: &mut Canvas, low: (f64, f64), high: (f64, f64), color: Rgb, frame: Frame) {
+    if !frame.reaches(high) {
+        return;
+    }
+    let pen = Pen::new(color, 1.0);
+    let is_cut = !(low.1.is_finite() && low.1 <= frame.bottom);
+    let bottom = if is_cut { frame.bottom } else { low.1 };
+    canvas.line(&[(high.0, bottom), (high.0, high.1)], pen);
+    canvas.line(&[(high.0 - 3.0, high.1), (high.0 + 3.0, high.1)], pen);
+    if !is_cut {
+        canvas.line(&[(high.0 - 3.0, bottom), (high.0 + 3.0, bottom)], pen);
     }
 }
 
@@ -191,7 +256,9 @@ fn labels(canvas: &mut Canvas, panel: &Panel, inner: Frame, outer: Frame) {
     let below = lettering(MIDDLE, HPos::Center, VPos::Top);
     canvas.letters(&panel.x_label, (middle.0, inner.bottom + 23.0), below);
     let beside = Lettering { is_upright: true, ..lettering(MIDDLE, HPos::Center, VPos::Top) };
-    canvas.letters(&panel.y_label, (outer.left + 4.0, middle.1), beside);
+    // Numbers of a log axis are long: its name moves into the margin.
+    let shift = if panel.y.spacing == Spacing::Log { -4.0 } else { 4.0 };
+    canvas.letters(&panel.y_label, (outer.left + shift, middle.1), beside);
 }
 
 /// In the corner of the panel that holds the fewest points.
@@ -236,6 +303,22 @@ pub fn draw_entry(canvas: &mut Canvas, entry: &KeyEntry, at: (f64, f64)) -> f64 
             canvas.broken_line(&[at, (at.0 + 24.0, at.1)], pattern, Pen::new(entry.color, 1.5));
             29.0
         }
+        Look::Marker(shape) => {
+            shape.draw(canvas, (at.0 + 6.0, at.1), Pen::new(entry.color, 0.0));
+            14.0
+        }
+        Look::Bars => {
+            let (x, color) = (at.0 + 6.0, entry.color);
+            canvas.line(&[(x, at.1 - 6.0), (x, at.1 + 6.0)], Pen::new(color, 1.0));
+            canvas.line(&[(x - 3.0, at.1 - 6.0), (x + 3.0, at.1 - 6.0)], Pen::new(color, 1.0));
+            canvas.line(&[(x - 3.0, at.1 + 6.0), (x + 3.0, at.1 + 6.0)], Pen::new(color, 1.0));
+            14.0
+        }
+        Look::Band => {
+            let pen = Pen { opacity: 0.2, ..Pen::new(entry.color, 0.0) };
+            canvas.rectangle((at.0, at.1 - 5.0), (at.0 + 24.0, at.1 + 5.0), pen);
+            29.0
+        }
     };
     canvas.letters(&entry.text, (at.0 + sample, at.1), lettering(SMALL, HPos::Left, VPos::Center));
     entry_width(entry)
@@ -243,7 +326,10 @@ pub fn draw_entry(canvas: &mut Canvas, entry: &KeyEntry, at: (f64, f64)) -> f64 
 
 /// The room of a sample with its text and the gap after it.
 pub fn entry_width(entry: &KeyEntry) -> f64 {
-    let sample = if entry.look == Look::Dots { 14.0 } else { 29.0 };
+    let sample = match entry.look {
+        Look::Dots | Look::Marker(_) | Look::Bars => 14.0,
+        Look::Line(_) | Look::Band => 29.0,
+    };
     sample + text_width(&entry.text, SMALL) + 16.0
 }
 

@@ -171,6 +171,7 @@ impl<'a> Story<'a> {
             marks,
             heat: None,
             key: Vec::new(),
+            notes: Vec::new(),
         })
     }
 
@@ -222,6 +223,7 @@ impl<'a> Story<'a> {
             marks,
             heat: None,
             key,
+            notes: Vec::new(),
         })
     }
 
@@ -293,6 +295,7 @@ impl<'a> Story<'a> {
             marks: Vec::new(),
             heat: Some(Heat::new(n, cell, shown.text)),
             key: Vec::new(),
+            notes: Vec::new(),
         })
     }
 }

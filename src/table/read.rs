@@ -178,7 +178,7 @@ fn norms(table: &Table, prefix: &str, row: usize) -> Result<Option<Norms>, Table
     Ok(Some(Norms { l1, l2, linf, rmse }))
 }
 
-fn open(path: &Path) -> Result<(File, ArrowReaderMetadata), TableError> {
+pub(super) fn open(path: &Path) -> Result<(File, ArrowReaderMetadata), TableError> {
     let file = File::open(path).map_err(|reason| TableError::system(path, "read", reason, 0))?;
     let metadata = ArrowReaderMetadata::load(&file, ArrowReaderOptions::new())
         .map_err(|reason| TableError::parquet(path, reason, 0))?;

@@ -1,0 +1,65 @@
+//! `lamella report`: one page and its numbers from the tables of a run or a sweep.
+
+use super::files::write_whole;
+use super::{CommandResult, Exit, Stopped, Terminal};
+use lamella::diagnostic::{Diagnostic, codes};
+use lamella::report::{self, ReportError};
+use lamella::table::TableError;
+use std::path::PathBuf;
+
+/// Draw report.html from the tables of a run or a sweep
+#[derive(clap::Args)]
+pub(crate) struct Arguments {
+    /// Folder of the results, such as results/gramling
+    folder: PathBuf,
+}
+
+pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
+    let page = report::report(&arguments.folder).map_err(|error| failed(&error))?;
+    let numbers = arguments.folder.join("report");
+    std::fs::create_dir_all(&numbers)
+        .map_err(|error| super::files::unwritable(&numbers, &error.to_string()))?;
+    remove_earlier(&numbers);
+    for (name, text) in &page.files {
+        write_whole(&numbers.join(name), text)?;
+    }
+    let path = arguments.folder.join("report.html");
+    write_whole(&path, &page.html)?;
+    if !terminal.is_quiet() {
+        let (path, numbers) = (path.display().to_string(), numbers.display().to_string());
+        let text = if terminal.is_json() {
+            let files: Vec<&String> = page.files.iter().map(|(name, _)| name).collect();
+            serde_json::json!({ "report": path, "folder": numbers, "files": files }).to_string() + "\n"
+        } else {
+            format!("report:   {path}\nnumbers:  {numbers} ({} CSV files)\n", page.files.len())
+        };
+        terminal.product(&text)?;
+    }
+    Ok(Exit::Done)
+}
+
+/// Numbers of an earlier report that this one may not have; other files stay.
+fn remove_earlier(folder: &std::path::Path) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let path = entry.path();
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        if name.ends_with(".csv") && report::FILE_STEMS.iter().any(|stem| name.starts_with(stem)) {
+            drop(std::fs::remove_file(path));
+        }
+    }
+}
+
+fn failed(error: &ReportError) -> Stopped {
+    let message = Diagnostic::error(codes::F101, error.to_string());
+    match error {
+        ReportError::NoResults(_) => {
+            let help = "`lamella run scene.lam` writes results/scene; give that folder";
+            Stopped::new(Exit::SceneWrong, message.help(help))
+        }
+        // What is damaged was whole once: running again makes it anew.
+        ReportError::Table(TableError::Foreign { .. } | TableError::Format { .. }) => {
+            Stopped::new(Exit::Failed, message.help("run the scene again to make the folder anew"))
+        }
+        ReportError::Table(_) | ReportError::Text { .. } => Stopped::new(Exit::Failed, message),
+    }
+}
