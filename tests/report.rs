@@ -162,6 +162,8 @@ fn write(folder: &Path, law: &Law, has_failure: bool) {
             row.error_message = Some("step 7: concentration of <A> is \u{1b}[31m−3".to_owned());
             row.values.clear();
             row.mass_defect = None;
+            // As of a point that was refused before it ran anywhere.
+            (row.key, row.host, row.started, row.finished) = (String::new(), String::new(), 0, 0);
             gatherer.add(&plan, row, &[], Vec::new()).unwrap();
         } else {
             let taken = snapshots(DISTANCES[row.replicate as usize]);
@@ -327,7 +329,7 @@ fn the_page_tells_everything_and_needs_nothing() {
         "neighbour search",
         "no kernel",
         "a-machine",
-        "2026-01-14 12:00:00 UTC",
+        "<td>first started</td><td class=\"n\">2026-01-14 12:00:00 UTC</td>",
         "&lt;script&gt;alert(1)&lt;/script&gt; &amp; more",
         "doi:10.1021/es0157144",
         "20260114",

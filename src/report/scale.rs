@@ -73,7 +73,17 @@ impl Scale {
     pub fn ticks(&self, wanted: usize) -> Vec<(f64, String)> {
         match self.spacing {
             Spacing::Linear => linear_ticks(self.low, self.high, wanted),
-            Spacing::Log => log_ticks(self.low, self.high),
+            Spacing::Log => {
+                let is_readable =
+                    |ticks: &[(f64, String)]| ticks.iter().filter(|(_, text)| !text.is_empty()).count() > 1;
+                let named = log_ticks(self.low, self.high, false);
+                if is_readable(&named) {
+                    return named;
+                }
+                // Less than a decade: all its digits have names, or round numbers between two of them.
+                let all = log_ticks(self.low, self.high, true);
+                if is_readable(&all) { all } else { linear_ticks(self.low, self.high, wanted) }
+            }
         }
     }
 }
@@ -125,7 +135,7 @@ fn minus(text: &str) -> String {
     text.replace('-', "−")
 }
 
-fn log_ticks(low: f64, high: f64) -> Vec<(f64, String)> {
+fn log_ticks(low: f64, high: f64, are_all_named: bool) -> Vec<(f64, String)> {
     let (first, last) = (log10(low).floor() as i32, log10(high).ceil() as i32);
     let n_decades = last - first;
     let every = (n_decades / 6 + 1).max(1);
@@ -139,6 +149,7 @@ fn log_ticks(low: f64, high: f64) -> Vec<(f64, String)> {
             }
             let is_named =
                 digit == 1 && exponent.rem_euclid(every) == 0 || is_narrow && matches!(digit, 2 | 5);
+            let is_named = is_named || are_all_named;
             ticks.push((value, if is_named { short(value, exponent) } else { String::new() }));
         }
     }
@@ -182,6 +193,11 @@ mod tests {
         assert_eq!(texts(0.0, 0.21, Spacing::Linear), ["0.00", "0.05", "0.10", "0.15", "0.20"].map(zero));
         assert_eq!(texts(0.0, 2.1e6, Spacing::Linear), ["0", "5·10⁵", "1.0·10⁶", "1.5·10⁶", "2.0·10⁶"]);
         assert_eq!(texts(0.02, 40.0, Spacing::Log), ["0.1", "1", "10"]);
+        assert_eq!(texts(0.055, 0.13, Spacing::Log), ["0.06", "0.07", "0.08", "0.09", "0.1"]);
+        assert_eq!(
+            texts(0.21, 0.24, Spacing::Log),
+            ["0.210", "0.215", "0.220", "0.225", "0.230", "0.235", "0.240"]
+        );
         assert_eq!(texts(1e-9, 1e-6, Spacing::Log), ["10⁻⁹", "10⁻⁸", "10⁻⁷", "10⁻⁶"]);
     }
 

@@ -163,6 +163,10 @@ impl Study {
 
 impl Circumstances {
     fn add(&mut self, row: &Row) {
+        // A point that was refused has run nowhere.
+        if row.word(3).is_none_or(|key| key.is_empty()) {
+            return;
+        }
         let insert = |set: &mut BTreeSet<String>, idx: usize| {
             row.word(idx).into_iter().for_each(|word| {
                 set.insert(word.into_owned());
