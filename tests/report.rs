@@ -452,3 +452,38 @@ fn what_holds_no_results_is_told_as_such() {
     assert_eq!(later.status.code(), Some(1));
     assert!(String::from_utf8_lossy(&later.stderr).contains("version 7"));
 }
+
+/// The scripts of docs/analysis over one sweep: each finds the common order and the largest mean
+/// concentration of the closed forms. Needs `LAMELLA_PYTHON`, as the test of the tables does.
+#[test]
+#[allow(clippy::print_stderr)] // Whoever runs the tests must see that this one checked nothing.
+fn scripts_of_other_tools_find_the_same_order() {
+    let Some(python) = std::env::var_os("LAMELLA_PYTHON") else {
+        let is_owed = ["CI", "LAMELLA_REQUIRE_PYTHON"].iter().any(|name| std::env::var_os(name).is_some());
+        assert!(!is_owed, "LAMELLA_PYTHON is not set, so the scripts of docs/analysis were not tried");
+        eprintln!("NOT CHECKED: LAMELLA_PYTHON is not set; the scripts of docs/analysis were not tried");
+        return;
+    };
+    let parent = tempfile::tempdir().unwrap();
+    let folder = parent.path().join("it's a sweep");
+    let law = Law { b: 0.01 };
+    write(&folder, &law, false);
+    let slope = |step: f64| (law.error(10_000, step) / law.error(100, step)).ln() / (2.0 * 10f64.ln());
+    let order = STEPS.map(slope).iter().sum::<f64>() / 3.0;
+    for script in ["with_pandas.py", "with_polars.py", "with_duckdb.py"] {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/analysis").join(script);
+        let output = std::process::Command::new(&python).arg(path).arg(&folder).output().unwrap();
+        let told = String::from_utf8_lossy(&output.stdout);
+        assert!(output.status.success(), "{script}: {}", String::from_utf8_lossy(&output.stderr));
+        let found = |what: &str| -> f64 {
+            let line =
+                told.lines().find_map(|line| line.strip_prefix(what)).unwrap_or_else(|| panic!("{told}"));
+            line.trim_start_matches(": ").parse().unwrap()
+        };
+        // Twelve decimals are printed.
+        assert!((found("order of err by particles") - order).abs() < 1e-12, "{script}: {told}");
+        let largest = concentration(N_BINS - 1, 16.0);
+        assert!((found("largest mean concentration of point 0") - largest).abs() < 1e-11, "{script}: {told}");
+        assert!(told.contains("step in s, err in 1\n"), "{script}: {told}");
+    }
+}
