@@ -6,10 +6,11 @@ use super::{Exit, Stopped, Terminal, machine, record};
 use lamella::Checked;
 use lamella::diagnostic::{Diagnostic, codes};
 use lamella::plan::compile::{Compiled, Options, Selection};
-use lamella::scenario::{Scenario, Settings, wanted_files};
+use lamella::scenario::{Scenario, Settings, sweeps, wanted_files};
 use lamella::source::{FileId, RefusedFile, Sources};
 use lamella::sweep::Scene;
 use lamella::sweep::frame::Session;
+use lamella::syntax::tree;
 use lamella::table::Record;
 use std::path::Path;
 
@@ -19,7 +20,13 @@ pub(crate) fn load(path: &Path, settings: &Settings, without_passes: bool) -> Re
     add_used(&mut sources, path);
     let passes = if without_passes { Selection::None } else { Selection::All };
     let options = Options { passes, memory: machine::available_memory() };
-    Ok(lamella::check(sources, settings, &options))
+    let checked = lamella::check(sources, settings, &options);
+    match settings.sweep.as_deref() {
+        Some(name) if sweeps(&checked.file).all(|sweep| sweep.name.value != name) => {
+            Err(no_sweep(&checked.file, Some(name)))
+        }
+        _ => Ok(checked),
+    }
 }
 
 /// Puts the files that a scene uses among its sources, or the reasons why they are not there.
@@ -119,6 +126,7 @@ fn pick(
     terminal: Option<&Terminal>,
 ) -> Result<Option<Sweep>, Stopped> {
     let options = Options { passes: Selection::All, memory: machine::available_memory() };
+    let settings = &Settings { sweep: name.map(str::to_owned), ..settings.clone() };
     let mut checked = lamella::check_with(sources, further, settings, &options);
     if let Some(terminal) = terminal {
         terminal.diagnostics(&checked.diagnostics, &checked.sources);
@@ -126,7 +134,7 @@ fn pick(
     let (Some(compiled), Some(scenario)) = (checked.compiled.take(), checked.scenario.take()) else {
         return Ok(None);
     };
-    let sweep = choose(&scenario, name)?;
+    let sweep = choose(&checked, &scenario, name)?;
     let record = record::record(&checked, &scenario, &compiled, &scene_name);
     // The statements of the used scene belong to every point.
     let file = lamella::base(&checked.whole, &checked.sources, sweep.of.as_deref());
@@ -135,26 +143,33 @@ fn pick(
 }
 
 /// The sweep of that name, or the only one.
-fn choose(scenario: &Scenario, name: Option<&str>) -> Result<lamella::scenario::sweep::Sweep, Stopped> {
-    let names: Vec<String> = scenario.sweeps.iter().map(|sweep| format!("`{}`", sweep.name)).collect();
+fn choose(
+    checked: &Checked,
+    scenario: &Scenario,
+    name: Option<&str>,
+) -> Result<lamella::scenario::sweep::Sweep, Stopped> {
+    let n_sweeps = sweeps(&checked.whole).count();
     let found = match name {
         Some(name) => scenario.sweeps.iter().find(|sweep| sweep.name == name),
-        None if scenario.sweeps.len() == 1 => scenario.sweeps.first(),
+        None if n_sweeps == 1 => scenario.sweeps.first(),
         None => None,
     };
-    found.cloned().ok_or_else(|| {
-        let what = match (name, names.is_empty()) {
-            (_, true) => "the scene has no sweep".to_owned(),
-            (Some(name), _) => format!("the scene has no sweep `{name}`"),
-            (None, _) => "the scene has several sweeps".to_owned(),
-        };
-        let message = Diagnostic::error(codes::F120, what);
-        let message = match names.is_empty() {
-            true => message.help("write a `sweep` statement, or give `--over step=1s,2s`"),
-            false => message.expected(names.join(", ")).help("name it after the file"),
-        };
-        Stopped::new(Exit::SceneWrong, message)
-    })
+    found.cloned().ok_or_else(|| no_sweep(&checked.whole, name))
+}
+
+fn no_sweep(file: &tree::File, name: Option<&str>) -> Stopped {
+    let names: Vec<String> = sweeps(file).map(|sweep| format!("`{}`", sweep.name.value)).collect();
+    let what = match (name, names.is_empty()) {
+        (_, true) => "the scene has no sweep".to_owned(),
+        (Some(name), _) => format!("the scene has no sweep `{name}`"),
+        (None, _) => "the scene has several sweeps".to_owned(),
+    };
+    let message = Diagnostic::error(codes::F120, what);
+    let message = match names.is_empty() {
+        true => message.help("write a `sweep` statement, or give `--over step=1s,2s`"),
+        false => message.expected(names.join(", ")).help("name it after the file"),
+    };
+    Stopped::new(Exit::SceneWrong, message)
 }
 
 impl Sweep {
@@ -178,6 +193,9 @@ impl Sweep {
         let own = self.scene.settings.set.iter().cloned();
         for (name, value) in own.chain(self.scene.assignments(combination)) {
             words.push(format!("--set {}", shell_word(&format!("{name}={value}"))));
+        }
+        if self.scene.sweep.of.is_some() {
+            words.push(format!("--sweep {}", shell_word(&self.scene.sweep.name)));
         }
         words.push(format!("--seed {seed}"));
         words.join(" ")

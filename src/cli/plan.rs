@@ -25,6 +25,9 @@ pub(crate) struct Arguments {
     /// Root of all random numbers, instead of the scene's
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+    /// Of several used scenes the one that this sweep is of [default: that of the first sweep]
+    #[arg(long, value_name = "NAME")]
+    sweep: Option<String>,
     /// Leave nothing out
     #[arg(long)]
     no_passes: bool,
@@ -43,7 +46,12 @@ enum Emit {
 }
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
-    let settings = Settings { set: arguments.set.clone(), seed: arguments.seed, ..Settings::default() };
+    let settings = Settings {
+        set: arguments.set.clone(),
+        seed: arguments.seed,
+        sweep: arguments.sweep.clone(),
+        ..Settings::default()
+    };
     let checked = load::load(&arguments.file, &settings, arguments.no_passes)?;
     terminal.diagnostics(&checked.diagnostics, &checked.sources);
     if let Some(text) = product(arguments, &checked) {

@@ -38,6 +38,9 @@ pub(crate) struct Arguments {
     /// Draw figure.svg in the folder of the results
     #[arg(long)]
     plot: bool,
+    /// Of several used scenes the one that this sweep is of [default: that of the first sweep]
+    #[arg(long, value_name = "NAME")]
+    sweep: Option<String>,
     /// Leave nothing out
     #[arg(long)]
     no_passes: bool,
@@ -64,7 +67,12 @@ pub(crate) fn scene_name(file: &Path) -> String {
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
     let interrupt = Interrupt::listen();
     let begin = Instant::now();
-    let settings = Settings { set: arguments.set.clone(), seed: arguments.seed, ..Settings::default() };
+    let settings = Settings {
+        set: arguments.set.clone(),
+        seed: arguments.seed,
+        sweep: arguments.sweep.clone(),
+        ..Settings::default()
+    };
     let mut checked = load::load(&arguments.file, &settings, arguments.no_passes)?;
     terminal.diagnostics(&checked.diagnostics, &checked.sources);
     let (Some(compiled), Some(scenario)) = (checked.compiled.take(), checked.scenario.take()) else {

@@ -34,7 +34,7 @@ pub use collect::resolve;
 pub use geometry::MAX_BINS;
 pub use measure::{Fact, Field, FieldTarget, Norm, Scalar};
 pub use places::SAME_TIME;
-pub use used::{MAX_USES, Used, Uses, resolve_all, wanted_files};
+pub use used::{MAX_USES, Used, Uses, resolve_all, sweeps, wanted_files};
 
 /// What the command line adds to a scene.
 #[derive(Debug, Clone, Default)]
@@ -43,6 +43,8 @@ pub struct Settings {
     pub set: Vec<(String, String)>,
     /// `--seed`, or the seed of a point and replicate.
     pub seed: Option<u64>,
+    /// The sweep whose scene is meant, where a file uses several; the first one if absent.
+    pub sweep: Option<String>,
     /// What a point of a sweep sets: these expressions stand in place of the scene's own. A point has no
     /// sweeps.
     pub point: Option<Vec<(sweep::Target, crate::syntax::tree::Expr)>>,

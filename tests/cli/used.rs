@@ -71,3 +71,35 @@ fn a_link_leads_to_no_file_outside() {
     link("study", "linked");
     folder.lamella(&["check", "linked/scene.lam"]).exits(0);
 }
+
+/// Each of two used scenes is run by the sweep that is of it.
+#[test]
+fn a_sweep_runs_the_scene_that_it_is_of() {
+    let folder = Folder::new();
+    folder.write("coarse.lam", COLUMN);
+    folder.write("fine.lam", COLUMN.replace("particles fluid 1000", "particles fluid 2000"));
+    let scene = "lamella 1\nuse \"coarse.lam\" as coarse\nuse \"fine.lam\" as fine\n\
+                 measure mass_coarse = mean(coarse.total.A)\nmeasure mass_fine = mean(fine.total.A)\n\
+                 sweep one of coarse { step 1 s, 2 s }\nsweep two of fine { fine.D 1e-9 m^2/s, 2e-9 m^2/s }\n";
+    folder.write("scene.lam", scene);
+    folder.lamella(&["sweep", "scene.lam"]).exits(2).says("[F120]").says("`one`, `two`");
+    for (name, particles, measure) in [("one", 1000, "mass_coarse"), ("two", 2000, "mass_fine")] {
+        folder.lamella(&["sweep", "scene.lam", name, "--out", name, "-q"]).exits(0);
+        let path = folder.path(&format!("{name}/points.parquet"));
+        let points = lamella::table::read::points(&path).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(points.len(), 2);
+        for point in &points {
+            assert_eq!(point.particles, particles);
+            assert_eq!(point.values.last().map(|it| it.name.as_str()), Some(measure));
+        }
+        folder.lamella(&["gather", name, "-q"]).exits(0);
+        let out = format!("run-{name}");
+        folder.lamella(&["run", "scene.lam", "--sweep", name, "--out", &out, "-q"]).exits(0);
+        let run = folder.path(&format!("{out}/points.parquet"));
+        let run = lamella::table::read::points(&run).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(run[0].particles, particles);
+    }
+    folder.lamella(&["plan", "scene.lam", "--sweep", "three"]).exits(2).says("no sweep `three`");
+    folder.write("scene.lam", scene.replace("sweep two", "sweep one"));
+    folder.lamella(&["check", "scene.lam"]).exits(2).says("two sweeps are called `one`");
+}

@@ -2,13 +2,13 @@
 
 use super::alias::Mentions;
 use super::{MAX_USES, Used, definitions, sweeps, written};
-use crate::diagnostic::codes::{D002, D003, F105, F106, S010, W001, W004, W005, W006};
+use crate::diagnostic::codes::{D002, D003, F105, F106, M002, S010, W001, W004, W005, W006};
 use crate::diagnostic::{Diagnostic, did_you_mean};
 use crate::scenario::choice::OUTPUTS;
 use crate::scenario::scope::reserved_meaning;
 use crate::scenario::sweep::Target;
 use crate::source::{FileId, Sources, Span};
-use crate::syntax::tree::{File, Use};
+use crate::syntax::tree::{File, Sweep, Use};
 use crate::syntax::words::is_statement_keyword;
 
 pub(super) fn too_many(statement: &Use) -> Diagnostic {
@@ -143,7 +143,17 @@ pub(super) fn sweeps_of(file: &File, wanted: &[&Use]) -> Vec<Diagnostic> {
     let aliases: Vec<&str> = wanted.iter().map(|it| it.alias.value.as_str()).collect();
     let listed = || aliases.iter().map(|alias| format!("`of {alias}`")).collect::<Vec<_>>().join(", ");
     let mut messages = Vec::new();
-    for sweep in sweeps(file) {
+    for (idx, sweep) in sweeps(file).enumerate() {
+        let is_twin = |it: &&Sweep| it.name.value == sweep.name.value && !is_same_scene(it, sweep);
+        if let Some(first) = sweeps(file).take(idx).find(is_twin) {
+            messages.push(
+                Diagnostic::error(M002, format!("two sweeps are called `{}`", sweep.name.value))
+                    .at(sweep.name.span, "here again")
+                    .also(first.name.span, "first here")
+                    .found("one name twice")
+                    .expected("a name for each sweep, whichever scene it is of"),
+            );
+        }
         match &sweep.of {
             Some(of) if !aliases.contains(&of.value.as_str()) => {
                 if let Some(message) = misspelt_alias(file, wanted, &of.value, of.span) {
@@ -195,6 +205,11 @@ pub(super) fn sweeps_of(file: &File, wanted: &[&Use]) -> Vec<Diagnostic> {
         }
     }
     messages
+}
+
+/// Sweeps of one scene are compared when it is resolved.
+fn is_same_scene(a: &Sweep, b: &Sweep) -> bool {
+    a.of.as_ref().map(|of| &of.value) == b.of.as_ref().map(|of| &of.value)
 }
 
 /// The alias to blame for one that does not exist: one that nothing uses and that differs by a slip, while

@@ -84,12 +84,13 @@ impl Uses {
         self.list.push(Used { alias: statement.alias.clone(), path: statement.path.value.clone(), file });
     }
 
-    /// The aliases whose scenes a file speaks of, that of its first sweep first; nothing but `None` for
-    /// a file that uses no other.
-    pub fn aliases(&self, file: &tree::File) -> Vec<Option<&str>> {
+    /// The aliases whose scenes a file speaks of; nothing but `None` for a file that uses no other. First
+    /// comes that of the sweep of that name, or of the first sweep.
+    pub fn aliases(&self, file: &tree::File, sweep: Option<&str>) -> Vec<Option<&str>> {
         let known = |name: &str| self.list.iter().map(|used| used.alias.value.as_str()).find(|a| *a == name);
         let mut aliases: Vec<Option<&str>> = Vec::new();
-        for alias in sweeps(file).filter_map(|sweep| known(&sweep.of.as_ref()?.value)) {
+        let named = sweeps(file).filter(|it| sweep == Some(&it.name.value));
+        for alias in named.chain(sweeps(file)).filter_map(|it| known(&it.of.as_ref()?.value)) {
             if !aliases.contains(&Some(alias)) {
                 aliases.push(Some(alias));
             }
@@ -109,7 +110,7 @@ impl Uses {
         file: &'f tree::File,
         alias: Option<&str>,
     ) -> (Cow<'f, tree::File>, Vec<Diagnostic>) {
-        let alias = alias.or_else(|| self.aliases(file).first().copied().flatten());
+        let alias = alias.or_else(|| self.aliases(file, None).first().copied().flatten());
         match self.list.iter().find(|used| Some(used.alias.value.as_str()) == alias) {
             Some(used) => {
                 let (merged, diagnostics) = merge::merged(file, used, &self.list);
@@ -148,7 +149,8 @@ fn written(file: &tree::File) -> Vec<&tree::Use> {
     uses.collect()
 }
 
-fn sweeps(file: &tree::File) -> impl Iterator<Item = &tree::Sweep> {
+/// The sweeps of a file, whichever scene they are of.
+pub fn sweeps(file: &tree::File) -> impl Iterator<Item = &tree::Sweep> {
     file.statements.iter().filter_map(|statement| match &statement.kind {
         StatementKind::Sweep(sweep) => Some(sweep),
         _ => None,
@@ -178,8 +180,8 @@ fn definitions(file: &tree::File) -> BTreeMap<String, Span> {
     all
 }
 
-/// Resolves the scenes that a file speaks of, and gives that of its first sweep. Settings are those of
-/// the first; what is told of several scenes is told once.
+/// Resolves the scenes that a file speaks of, and gives that of the sweep that the settings name, or of
+/// the first one. Settings are those of this scene; what is told of several scenes is told once.
 pub fn resolve_all(
     file: &tree::File,
     uses: &Uses,
@@ -187,7 +189,7 @@ pub fn resolve_all(
     settings: &Settings,
     has_syntax_errors: bool,
 ) -> (Option<Scenario>, Vec<Diagnostic>) {
-    let aliases = uses.aliases(file);
+    let aliases = uses.aliases(file, settings.sweep.as_deref());
     let mut first = None;
     let mut told: Vec<Vec<Diagnostic>> = Vec::new();
     for (idx, alias) in aliases.iter().enumerate() {
