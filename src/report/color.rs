@@ -12,6 +12,8 @@ pub const WHITE: Rgb = Rgb(255, 255, 255);
 pub const INK: Rgb = Rgb(40, 40, 40);
 /// Dots that stand for the run in any colour.
 pub const FAINT: Rgb = Rgb(110, 110, 110);
+/// Series in the background.
+pub const PALE: Rgb = Rgb(185, 185, 185);
 pub const GRID: Rgb = Rgb(228, 228, 228);
 /// Bins without particles on a map.
 pub const EMPTY: Rgb = Rgb(205, 205, 205);

@@ -31,12 +31,12 @@ pub fn budget(study: &Study) -> (String, Vec<(String, String)>) {
         cells.push(number(point.worst_defect));
         csv.row(cells);
     }
-    let text = format!(
-        "The largest relative mass defect of any component is {} (point {}, replicate {}).",
-        quantity::number(worst.value),
-        worst.point,
-        worst.replicate
-    );
+    let place = match (study.points.len(), worst.value > 0.0) {
+        (2.., true) => format!(" (point {}, replicate {})", worst.point, worst.replicate),
+        _ => String::new(),
+    };
+    let value = quantity::number(worst.value);
+    let text = format!("The largest relative mass defect of any component is {value}{place}.");
     let mut body = paragraph(&text);
     if all.len() > 1 {
         let n_zero = all.iter().filter(|(_, defect)| *defect == 0.0).count();

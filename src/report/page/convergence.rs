@@ -10,10 +10,13 @@ use super::super::sweep::{ExpectedOrder, SweepDescription, SweepReport};
 use super::csv::{Csv, number};
 use super::html::{escape, figure, paragraph, table};
 use super::quantity::{self, interval, label, shown};
-use super::series::{self, Series, color, key_entry, log_panel, shape, slug};
+use super::series::{self, Series, color, key_entry, log_panel, marker, slug};
 use super::stats::{Moments, Slope, fit};
 use super::study::Study;
 use crate::maths::scalar::{exp, ln};
+
+/// Series whose orders are listed on the page.
+const MOST_ROWS: usize = 30;
 
 /// A measure against an axis.
 struct Course<'a> {
@@ -99,34 +102,42 @@ impl<'a> Course<'a> {
         let x = shown(&axis.unit, all().map(|(x, _)| x).fold(0.0, f64::max));
         let y = shown(&self.study.columns[self.column].unit, all().map(|(_, y)| y.mean).fold(0.0, f64::max));
         let (mut marks, mut key) = self.guide((x.factor, y.factor));
+        let slots = series::slots(self.groups.len());
+        let pale = self.groups.iter().zip(&slots).filter(|(_, slot)| slot.is_none());
+        let pale = pale.flat_map(|(group, _)| places(group, self.axis, self.column));
+        marks
+            .push(series::faint_mark(pale.map(|(at, y_at)| (at / x.factor, y_at.mean / y.factor)).collect()));
         for (idx, group) in self.groups.iter().enumerate() {
-            let mine = || places(group, self.axis, self.column);
-            if let Some(fit) = &self.fits[idx] {
-                marks.push(Mark {
-                    points: line(fit, mine().map(|(x, _)| x), (x.factor, y.factor)),
-                    color: color(idx),
-                    look: Look::Line(&[]),
-                });
-            }
-            let bars = mine().filter_map(|(place, moments)| {
-                let error = moments.standard_error()?;
-                let end = |value: f64| (place / x.factor, value / y.factor);
-                Some([end(moments.mean - error), end(moments.mean + error)])
-            });
-            marks.push(Mark { points: bars.flatten().collect(), color: color(idx), look: Look::Bars });
-            let points = mine().map(|(place, moments)| (place / x.factor, moments.mean / y.factor)).collect();
-            marks.push(Mark { points, color: color(idx), look: Look::Marker(shape(idx)) });
-            if idx < series::MOST_SERIES {
-                let order = self.fits[idx].as_ref().map(|fit| interval(fit.slope, fit.half_width));
-                let order = order.map(|order| format!("order {order}"));
-                let name = Some(series::name(self.study, &group.shared)).filter(|name| !name.is_empty());
-                let text: Vec<String> = name.into_iter().chain(order).collect();
-                key.push(key_entry(idx, text.join(": ")));
-            }
+            let Some(slot) = slots[idx] else { continue };
+            marks.extend(self.series_marks(idx, slot, (x.factor, y.factor)));
+            let order = self.fits[idx].as_ref().map(|fit| interval(fit.slope, fit.half_width));
+            let order = order.map(|order| format!("order {order}"));
+            let name = Some(series::name(self.study, &group.shared)).filter(|name| !name.is_empty());
+            let text: Vec<String> = name.into_iter().chain(order).collect();
+            key.push(key_entry(slot, text.join(": ")));
         }
-        key.extend(series::further(self.groups.len()));
+        key.extend(series::further(&slots));
         let panel = log_panel(label(&axis.name, &x), label(self.measure, &y), marks);
         sheet(None, key, &[panel], (760.0, 440.0), 1)
+    }
+
+    /// The fit, the error bars and the means of a series, in the units of the axes.
+    fn series_marks(&self, idx: usize, slot: usize, factors: (f64, f64)) -> Vec<Mark> {
+        let color = color(slot);
+        let mine = || places(&self.groups[idx], self.axis, self.column);
+        let at = |x: f64, y: f64| (x / factors.0, y / factors.1);
+        let bars = mine().filter_map(|(x, moments)| {
+            let error = moments.standard_error()?;
+            Some([at(x, moments.mean - error), at(x, moments.mean + error)])
+        });
+        let means = mine().map(|(x, moments)| at(x, moments.mean));
+        let fit = self.fits[idx].as_ref();
+        let line = fit.map(|fit| line(fit, mine().map(|(x, _)| x), factors)).unwrap_or_default();
+        vec![
+            Mark { points: line, color, look: Look::Line(&[]) },
+            Mark { points: bars.flatten().collect(), color, look: Look::Bars },
+            Mark { points: means.collect(), color, look: marker(slot) },
+        ]
     }
 
     /// The expected slopes through the middle of the points: the wedge between the ends of the range, and
@@ -199,8 +210,12 @@ impl<'a> Course<'a> {
                 order.unwrap_or_else(|| "too few points".to_owned()),
             ]
         };
-        let rows: Vec<_> = self.groups.iter().zip(&self.fits).take(30).map(row).collect();
-        table(&["series", "points", "order ± 95 %"], &rows)
+        let rows: Vec<_> = self.groups.iter().zip(&self.fits).take(MOST_ROWS).map(row).collect();
+        let more = match self.groups.len().saturating_sub(MOST_ROWS) {
+            0 => String::new(),
+            n => paragraph(&format!("{n} more series stand in the CSV file.")),
+        };
+        table(&["series", "points", "order ± 95 %"], &rows) + &more
     }
 
     fn points_csv(&self) -> String {

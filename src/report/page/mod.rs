@@ -221,14 +221,17 @@ fn summary(study: &Study, sweep: Option<&SweepDescription>) -> String {
         None => run_sentence(study),
     };
     text += &format!(
-        " It took {} of wall time and {} of CPU time.",
+        "{} {} of wall time and {} of CPU time.",
+        if sweep.is_some() { " The runs took, added up," } else { " It took" },
         quantity::duration(study.wall),
         quantity::duration(study.cpu)
     );
     if let Some(worst) = study.worst_defect {
         let at = match sweep {
-            Some(_) => format!(" (point {}, replicate {})", worst.point, worst.replicate),
-            None => String::new(),
+            Some(_) if worst.value > 0.0 => {
+                format!(" (point {}, replicate {})", worst.point, worst.replicate)
+            }
+            _ => String::new(),
         };
         text += &format!(" The worst mass defect is {}{at}.", quantity::number(worst.value));
     }

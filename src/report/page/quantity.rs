@@ -66,7 +66,11 @@ pub fn interval(value: f64, half_width: Option<f64>) -> String {
     let decimals = if half > 0.0 { (1 - log10(half).floor() as i32).clamp(0, 4) as usize } else { 4 };
     let rounds_to_zero = half < 0.5 * power_of_ten(-(decimals as i32));
     let half = if rounds_to_zero { "0".to_owned() } else { format!("{half:.decimals$}") };
-    format!("{value:.decimals$} ± {half}").replace('-', "−")
+    let written = format!("{value:.decimals$}");
+    // What rounds to zero has no sign.
+    let is_zero = written.chars().all(|c| matches!(c, '-' | '0' | '.'));
+    let written = if is_zero { written.trim_start_matches('-').to_owned() } else { written };
+    format!("{written} ± {half}").replace('-', "−")
 }
 
 /// A duration of a run: `0.24 s`, `12 min 5 s`, `3 h 20 min`.
@@ -113,6 +117,7 @@ mod tests {
         assert_eq!(with_unit(3.0, "m^2/s"), "3 m²/s");
         assert_eq!(interval(-0.512_34, Some(0.034_4)), "−0.512 ± 0.034");
         assert_eq!(interval(-0.5, Some(1e-16)), "−0.5000 ± 0");
+        assert_eq!(interval(-0.001, Some(0.16)), "0.00 ± 0.16");
         assert_eq!(interval(2.0, None), "2");
     }
 

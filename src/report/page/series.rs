@@ -3,14 +3,14 @@
 //! Owns how groups are formed and told apart. May use `study`, `panel`, `color`. It deliberately
 //! decides on colour and shape together, so that a print without colour can be read.
 
-use super::super::color::{FAINT, Rgb, SERIES};
+use super::super::color::{PALE, Rgb, SERIES};
 use super::super::panel::{KeyEntry, Look, Mark, Panel, Shape};
 use super::super::scale::{Scale, Spacing};
 use super::quantity::with_unit;
 use super::study::{PointSummary, Study};
 
-/// Groups with a look of their own; the others are grey.
-pub const MOST_SERIES: usize = 10;
+/// Groups with a look of their own; of more the others are faint dots.
+const MOST_SERIES: usize = 8;
 
 /// Points that agree in some axes.
 pub struct Series<'a> {
@@ -68,24 +68,39 @@ pub fn full_name(study: &Study, point: &PointSummary) -> String {
     name(study, &values)
 }
 
-pub fn color(idx: usize) -> Rgb {
-    if idx < MOST_SERIES { SERIES[idx % SERIES.len()] } else { FAINT }
+/// The look of each of `n` groups: those with one are evenly spread, the first and the last among them.
+pub fn slots(n: usize) -> Vec<Option<usize>> {
+    if n <= MOST_SERIES {
+        return (0..n).map(Some).collect();
+    }
+    let mut slots = vec![None; n];
+    (0..MOST_SERIES).for_each(|slot| slots[slot * (n - 1) / (MOST_SERIES - 1)] = Some(slot));
+    slots
+}
+
+pub fn color(slot: usize) -> Rgb {
+    SERIES[slot % SERIES.len()]
 }
 
 /// Seven colours and four shapes come together anew only after 28.
-pub fn shape(idx: usize) -> Shape {
-    Shape::ALL[idx % Shape::ALL.len()]
+pub fn marker(slot: usize) -> Look {
+    Look::Marker(Shape::ALL[slot % Shape::ALL.len()])
 }
 
-pub fn key_entry(idx: usize, text: String) -> KeyEntry {
-    KeyEntry { text, color: color(idx), look: Look::Marker(shape(idx)) }
+pub fn key_entry(slot: usize, text: String) -> KeyEntry {
+    KeyEntry { text, color: color(slot), look: marker(slot) }
 }
 
-/// An entry for the grey ones.
-pub fn further(n_series: usize) -> Option<KeyEntry> {
-    let n = n_series.saturating_sub(MOST_SERIES);
-    let text = format!("{n} more (all in the CSV file)");
-    (n > 0).then_some(KeyEntry { text, color: FAINT, look: Look::Marker(Shape::Circle) })
+/// Groups without a look of their own, to lie below the others.
+pub fn faint_mark(points: Vec<(f64, f64)>) -> Mark {
+    Mark { points, color: PALE, look: Look::Dots }
+}
+
+/// An entry for the groups without a look of their own.
+pub fn further(slots: &[Option<usize>]) -> Option<KeyEntry> {
+    let n = slots.iter().filter(|slot| slot.is_none()).count();
+    let text = format!("{n} more series");
+    (n > 0).then_some(KeyEntry { text, color: PALE, look: Look::Dots })
 }
 
 /// A panel with marks only, on log axes that cover them.
@@ -121,4 +136,24 @@ pub fn slug(text: &str) -> String {
     let safe = |c: char| if c.is_alphanumeric() || "._-".contains(c) { c } else { '_' };
     let slug: String = text.chars().map(safe).collect();
     slug.trim_start_matches('.').to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn looks_are_spread_over_many_series() {
+        assert_eq!(slots(3), [Some(0), Some(1), Some(2)]);
+        let many = slots(50);
+        let named: Vec<usize> = (0..50).filter(|idx| many[*idx].is_some()).collect();
+        assert_eq!(named, [0, 7, 14, 21, 28, 35, 42, 49]);
+        assert_eq!(further(&many).map(|entry| entry.text), Some("42 more series".to_owned()));
+        assert_eq!(further(&slots(8)), None);
+    }
+
+    #[test]
+    fn names_of_files_stay_in_their_folder() {
+        assert_eq!(slug("../err or/ü"), "_err_or_ü");
+    }
 }

@@ -11,7 +11,7 @@ use super::super::sweep::SweepReport;
 use super::csv::{Csv, number};
 use super::html::{escape, figure, paragraph, table};
 use super::quantity::{self, label, shown};
-use super::series::{self, Series, color, key_entry, log_panel, shape, slug};
+use super::series::{self, Series, color, key_entry, log_panel, marker, slug};
 use super::stats::{Moments, pareto};
 use super::study::Study;
 
@@ -60,13 +60,23 @@ struct Names<'a> {
     against: &'a str,
 }
 
+impl Names<'_> {
+    /// The cost in words.
+    fn cost(&self) -> &str {
+        match self.against {
+            "wall_time" => "wall time",
+            "cpu_time" => "CPU time",
+            other => other,
+        }
+    }
+}
+
 fn one(study: &Study, measure: usize, cost: usize, names: &Names, by: &[String]) -> (String, String) {
     let axes: Vec<usize> = by.iter().filter_map(|name| study.axis(name)).collect();
     let groups = series::series(study, &axes);
     let places = places(study, &groups, measure, cost, &axes);
     let csv = csv(study, &places, names);
-    let heading =
-        format!("<h3>{} against {}</h3>\n", escape(names.measure), escape(&names.against.replace('_', " ")));
+    let heading = format!("<h3>{} against {}</h3>\n", escape(names.measure), escape(names.cost()));
     if places.is_empty() {
         return (heading + &paragraph("No point has both numbers, each above zero."), csv);
     }
@@ -120,34 +130,29 @@ fn drawing(study: &Study, groups: &[Series], places: &[Place], units: [&String; 
     let line = front.iter().map(|place| at(place)).collect();
     let mut marks = vec![Mark { points: line, color: INK, look: Look::Line(&[]) }];
     let mut key = vec![KeyEntry { text: "Pareto front".to_owned(), color: INK, look: Look::Line(&[]) }];
+    let slots = series::slots(groups.len());
+    let pale = places.iter().filter(|place| slots[place.series].is_none()).map(at);
+    marks.insert(0, series::faint_mark(pale.collect()));
     for (idx, group) in groups.iter().enumerate() {
+        let Some(slot) = slots[idx] else { continue };
         let mine = || places.iter().filter(|place| place.series == idx);
         let bars = mine().filter_map(|place| {
             let error = place.measure.standard_error()? / y.factor;
             let (x, y) = at(place);
             Some([(x, y - error), (x, y + error)])
         });
-        marks.push(Mark { points: bars.flatten().collect(), color: color(idx), look: Look::Bars });
-        marks.push(Mark {
-            points: mine().map(at).collect(),
-            color: color(idx),
-            look: Look::Marker(shape(idx)),
-        });
-        if idx < series::MOST_SERIES && !group.shared.is_empty() {
-            key.push(key_entry(idx, series::name(study, &group.shared)));
+        marks.push(Mark { points: bars.flatten().collect(), color: color(slot), look: Look::Bars });
+        marks.push(Mark { points: mine().map(at).collect(), color: color(slot), look: marker(slot) });
+        if !group.shared.is_empty() {
+            key.push(key_entry(slot, series::name(study, &group.shared)));
         }
     }
-    key.extend(series::further(groups.len()));
+    key.extend(series::further(&slots));
     // The front is named first, so that its names find room.
     let note = |place: &&Place| Note { at: at(place), text: place.note.clone() };
     let others = places.iter().filter(|place| !place.is_front && places.len() <= MOST_NOTES);
     let notes = front.iter().copied().chain(others).filter(|place| !place.note.is_empty());
-    let cost_name = match names.against {
-        "wall_time" => "wall time",
-        "cpu_time" => "CPU time",
-        other => other,
-    };
-    let mut panel = log_panel(label(cost_name, &x), label(names.measure, &y), marks);
+    let mut panel = log_panel(label(names.cost(), &x), label(names.measure, &y), marks);
     panel.notes = notes.map(|place| note(&place)).collect();
     sheet(None, key, &[panel], (760.0, 460.0), 1)
 }
@@ -173,7 +178,7 @@ fn front(places: &[Place], units: [&String; 2], names: &Names) -> String {
         0 => String::new(),
         n => paragraph(&format!("{n} more points of the front stand in the CSV file.")),
     };
-    let heads = ["point", "values", names.against, names.measure];
+    let heads = ["point", "values", names.cost(), names.measure];
     table(&heads, &rows) + &more
 }
 
