@@ -117,6 +117,21 @@ pub(crate) fn load_session(session: &Session) -> Result<Option<Sweep>, Stopped> 
     pick(sources, &further, Some(&session.sweep), &settings, names, None)
 }
 
+/// The sweep of a session in the scene as it is today.
+pub(crate) fn load_session_at(
+    session: &Session,
+    path: &Path,
+    terminal: &Terminal,
+) -> Result<Option<Sweep>, Stopped> {
+    let mut sources = Sources::single(display_name(path), read_scene(path)?);
+    add_used(&mut sources, path);
+    let of_program = session.sources[1..].iter().filter(|(name, _)| name.starts_with("--"));
+    let further: Vec<(&str, String)> = of_program.map(|(name, text)| (name.as_str(), text.clone())).collect();
+    let settings = Settings { set: session.set.clone(), seed: session.seed, ..Settings::default() };
+    let names = (display_name(path), scene_name(path));
+    pick(sources, &further, Some(&session.sweep), &settings, names, Some(terminal))
+}
+
 fn pick(
     sources: Sources,
     further: &[(&str, String)],

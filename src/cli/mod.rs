@@ -22,6 +22,8 @@ mod sweep;
 mod sweep_folder;
 mod terminal;
 mod text;
+mod verify;
+mod why;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use lamella::diagnostic::Diagnostic;
@@ -80,6 +82,9 @@ enum Command {
     Gather(sweep_folder::GatherArguments),
     Status(sweep_folder::StatusArguments),
     Report(report::Arguments),
+    Why(why::Arguments),
+    Verify(verify::Arguments),
+    Repro(verify::ReproArguments),
     Explain(explain::Arguments),
     Completions(completions::Arguments),
 }
@@ -122,6 +127,9 @@ pub(crate) fn main() -> ExitCode {
         Command::Gather(gather) => sweep_folder::gather(gather, &terminal),
         Command::Status(status) => sweep_folder::status(status, &terminal),
         Command::Report(report) => report::run(report, &terminal),
+        Command::Why(why) => why::run(why, &terminal),
+        Command::Verify(verify) => verify::run(verify, &terminal),
+        Command::Repro(repro) => verify::repro(repro, &terminal),
         Command::New(new) => new::run(new, &terminal),
         Command::Explain(explain) => explain::run(explain, &terminal),
         Command::Completions(completions) => completions::run(completions, &terminal),

@@ -7,13 +7,15 @@ use super::progress::Progress;
 use super::summary::Summary;
 use super::text::{bytes, duration, grouped};
 use super::{CommandResult, Exit, Stopped, Terminal, machine, record};
+use lamella::Checked;
 use lamella::diagnostic::{Diagnostic, codes};
 use lamella::engine::snapshot::{Outcome, Snapshot, Values};
 use lamella::engine::{self, Control, RunError};
 use lamella::measure::{self, Evaluated};
-use lamella::plan::compile::Compiled;
+use lamella::plan::compile::{Compiled, Options};
 use lamella::report;
 use lamella::scenario::Settings;
+use lamella::source::Sources;
 use lamella::table::{Record, Swept, TableError, Writer};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -65,7 +67,6 @@ pub(crate) fn scene_name(file: &Path) -> String {
 }
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
-    let interrupt = Interrupt::listen();
     let begin = Instant::now();
     let settings = Settings {
         set: arguments.set.clone(),
@@ -73,22 +74,60 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
         sweep: arguments.sweep.clone(),
         ..Settings::default()
     };
-    let mut checked = load::load(&arguments.file, &settings, arguments.no_passes)?;
+    let checked = load::load(&arguments.file, &settings, arguments.no_passes)?;
+    let asked = Asked {
+        name: scene_name(&arguments.file),
+        folder: arguments.folder(),
+        n_threads: arguments.n_threads(),
+        wants_figure: arguments.plot,
+        begin,
+    };
+    run_checked(checked, asked, terminal)
+}
+
+/// Runs texts that are no file of the user's, as they were run once.
+pub(crate) fn run_sources(
+    sources: Sources,
+    name: &str,
+    settings: &Settings,
+    folder: &Path,
+    n_threads: usize,
+    terminal: &Terminal,
+) -> CommandResult {
+    let begin = Instant::now();
+    let options = Options { memory: machine::available_memory(), ..Options::default() };
+    let checked = lamella::check(sources, settings, &options);
+    let folder = folder.to_path_buf();
+    let asked = Asked { name: name.to_owned(), folder, n_threads, wants_figure: true, begin };
+    run_checked(checked, asked, terminal)
+}
+
+/// What a run is asked for besides its scene.
+struct Asked {
+    name: String,
+    folder: PathBuf,
+    n_threads: usize,
+    wants_figure: bool,
+    begin: Instant,
+}
+
+fn run_checked(mut checked: Checked, asked: Asked, terminal: &Terminal) -> CommandResult {
+    let interrupt = Interrupt::listen();
     terminal.diagnostics(&checked.diagnostics, &checked.sources);
     let (Some(compiled), Some(scenario)) = (checked.compiled.take(), checked.scenario.take()) else {
         return Ok(Exit::SceneWrong);
     };
-    let compile_wall = begin.elapsed().as_secs_f64();
+    let compile_wall = asked.begin.elapsed().as_secs_f64();
     terminal.remark(&announcement(&compiled));
     if !compiled.left_out.is_empty() {
         terminal.diagnostics(&[compiled.left_out_note()], &checked.sources);
     }
     let job = Job {
-        record: record::record(&checked, &scenario, &compiled, &scene_name(&arguments.file)),
+        record: record::record(&checked, &scenario, &compiled, &asked.name),
         swept: record::swept(&scenario),
-        folder: arguments.folder(),
-        n_threads: arguments.n_threads(),
-        wants_figure: arguments.plot,
+        folder: asked.folder,
+        n_threads: asked.n_threads,
+        wants_figure: asked.wants_figure,
         compile_wall,
         compiled,
     };

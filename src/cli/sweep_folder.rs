@@ -41,6 +41,35 @@ impl std::fmt::Display for Shard {
     }
 }
 
+/// A point and one of its replicates, `12` or `12/3`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Which {
+    pub(crate) point: u32,
+    pub(crate) replicate: u32,
+}
+
+impl FromStr for Which {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = |_| "expected POINT or POINT/REPLICATE, such as 12 or 12/3".to_owned();
+        let (point, replicate) = text.split_once('/').unwrap_or((text, "0"));
+        Ok(Self { point: point.parse().map_err(wrong)?, replicate: replicate.parse().map_err(wrong)? })
+    }
+}
+
+/// The point that is asked for, or how many there are.
+pub(crate) fn point_of(points: &Points, which: Which) -> Result<&lamella::sweep::Point, Stopped> {
+    points.list.get(which.point as usize).ok_or_else(|| {
+        let message = Diagnostic::error(codes::F122, format!("the sweep has no point {}", which.point));
+        let expected = match points.len() {
+            0 => "a sweep with points".to_owned(),
+            n => format!("0 to {}", n - 1),
+        };
+        Stopped::new(Exit::SceneWrong, message.found(which.point.to_string()).expected(expected))
+    })
+}
+
 /// An open folder.
 pub(crate) struct Folder {
     pub(crate) journal: Journal,
@@ -55,7 +84,7 @@ impl Folder {
 }
 
 /// All journals of a folder, in the order of their names.
-fn journals(folder: &Path) -> Result<Vec<Journal>, Stopped> {
+pub(crate) fn journals(folder: &Path) -> Result<Vec<Journal>, Stopped> {
     let entries = std::fs::read_dir(folder.join("journal")).into_iter().flatten().flatten();
     let mut paths: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
     paths.retain(|path| path.extension().is_some_and(|extension| extension == "journal"));
@@ -71,7 +100,7 @@ fn journals(folder: &Path) -> Result<Vec<Journal>, Stopped> {
 }
 
 /// The newest session of all journals.
-fn newest(journals: &[Journal]) -> Option<&Session> {
+pub(crate) fn newest(journals: &[Journal]) -> Option<&Session> {
     journals.iter().flat_map(|journal| &journal.sessions).max_by_key(|session| session.started)
 }
 
@@ -91,7 +120,7 @@ pub(crate) fn gather(arguments: &GatherArguments, terminal: &Terminal) -> Comman
 }
 
 /// The journals of a folder and the sweep of their newest session.
-fn open(folder: &Path) -> Result<(Vec<Journal>, load::Sweep), Stopped> {
+pub(crate) fn open(folder: &Path) -> Result<(Vec<Journal>, load::Sweep), Stopped> {
     let journals = journals(folder)?;
     let loaded = newest(&journals).map(load::load_session).transpose()?.flatten();
     let loaded = loaded.ok_or_else(|| {

@@ -38,6 +38,22 @@ pub(crate) fn with_prefix(value: f64) -> String {
 }
 
 /// `1234567` as `1 234 567`.
+/// Microseconds since 1970 as date and time, UTC: `2026-11-23 23:15`.
+pub(crate) fn date(micros: i64) -> String {
+    let minutes = micros.div_euclid(60_000_000);
+    let (days, minute) = (minutes.div_euclid(1440), minutes.rem_euclid(1440));
+    // Civil calendar from days since 1970: years that begin in March, eras of 400 of them.
+    let shifted = days + 719_468;
+    let (era, day_of_era) = (shifted.div_euclid(146_097), shifted.rem_euclid(146_097));
+    let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
+    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let month_from_march = (5 * day_of_year + 2) / 153;
+    let day = day_of_year - (153 * month_from_march + 2) / 5 + 1;
+    let month = if month_from_march < 10 { month_from_march + 3 } else { month_from_march - 9 };
+    let year = year_of_era + era * 400 + i64::from(month <= 2);
+    format!("{year:04}-{month:02}-{day:02} {:02}:{:02}", minute / 60, minute % 60)
+}
+
 pub(crate) fn grouped(n: u64) -> String {
     let digits = n.to_string();
     let mut out = String::new();
@@ -99,6 +115,14 @@ pub(crate) fn table(header: &[(&str, Align)], rows: &[Vec<String>]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn dates_are_those_of_the_calendar() {
+        assert_eq!(date(0), "1970-01-01 00:00");
+        assert_eq!(date(951_782_399_999_999), "2000-02-28 23:59");
+        assert_eq!(date(951_782_400_000_000), "2000-02-29 00:00");
+        assert_eq!(date(1_795_475_700_000_000), "2026-11-23 23:15");
+    }
 
     #[test]
     fn durations_read_well_at_every_scale() {

@@ -88,6 +88,51 @@ pub fn write(compiled: &Compiled, scenario: &Scenario, sources: &[EmbeddedSource
     serde_yaml::to_string(&document).expect("a plan is made of numbers, lists and names")
 }
 
+/// Where a plan comes from: what is needed to make it again.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Origin {
+    /// `--set name=value`, in order.
+    pub settings: Vec<(String, String)>,
+    pub seed: u64,
+    /// The scene, then the files that it uses.
+    pub sources: Vec<EmbeddedSource>,
+}
+
+impl Origin {
+    /// The name of the scene's file without its ending.
+    pub fn scene_name(&self) -> String {
+        let name = self.sources.first().map_or("scene.lam", |source| source.name.as_str());
+        name.strip_suffix(".lam").unwrap_or(name).to_owned()
+    }
+
+    /// Names and texts of the used files.
+    pub fn used(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.sources.iter().skip(1).map(|source| (source.name.as_str(), source.text.as_str()))
+    }
+}
+
+/// Reads where a plan comes from; one sentence if the text does not tell.
+pub fn origin(text: &str) -> Result<Origin, String> {
+    #[derive(Deserialize)]
+    struct ReadSetting {
+        name: String,
+        value: String,
+    }
+    #[derive(Deserialize)]
+    struct Seeded {
+        seed: u64,
+    }
+    #[derive(Deserialize)]
+    struct ReadOrigin {
+        settings: Vec<ReadSetting>,
+        plan: Seeded,
+        sources: Vec<EmbeddedSource>,
+    }
+    let read: ReadOrigin = serde_yaml::from_str(text).map_err(|error| format!("not a plan: {error}"))?;
+    let settings = read.settings.into_iter().map(|setting| (setting.name, setting.value)).collect();
+    Ok(Origin { settings, seed: read.plan.seed, sources: read.sources })
+}
+
 /// Reads a plan back; one sentence if the text is no plan, or not the one whose hash it carries.
 pub fn read(text: &str) -> Result<(Plan, Evaluation), String> {
     let document: ReadDocument =

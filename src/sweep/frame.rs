@@ -22,6 +22,20 @@ pub struct Replicate {
     pub snapshots: Vec<Snapshot>,
 }
 
+impl Replicate {
+    /// Whether results and errors are the same, bit by bit.
+    pub fn has_bytes_of(&self, other: &Self) -> bool {
+        let bytes = |replicate: &Self| {
+            let mut bytes = Vec::new();
+            replicate.snapshots.put(&mut bytes);
+            replicate.errors.put(&mut bytes);
+            replicate.row.status.put(&mut bytes);
+            bytes
+        };
+        bytes(self) == bytes(other)
+    }
+}
+
 /// One start of the program on this journal.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Session {

@@ -191,8 +191,11 @@ impl Journal {
         (done, self.entries.len() - done)
     }
 
-    pub fn keys(&self) -> impl Iterator<Item = &Key> {
-        self.entries.keys()
+    /// All replicates, in the order in which they were written.
+    pub fn entries(&self) -> Vec<(Key, Entry)> {
+        let mut list: Vec<(Key, Entry)> = self.entries.iter().map(|(key, entry)| (*key, *entry)).collect();
+        list.sort_by_key(|(_, entry)| entry.offset);
+        list
     }
 
     pub fn n_bytes(&self) -> u64 {

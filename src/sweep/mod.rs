@@ -10,10 +10,11 @@ pub mod gather;
 pub mod journal;
 pub mod points;
 mod queue;
-mod replicate;
+pub mod replicate;
 pub mod run;
 pub mod scene;
 mod seed;
+pub mod why;
 
 pub use journal::{Journal, JournalError};
 pub use points::{Point, Points};

@@ -27,6 +27,12 @@ pub fn tokenize(file: FileId, text: &str) -> Vec<Token> {
     tokens
 }
 
+/// The tokens of a part of a text, with their characters.
+pub fn tokens(text: &str) -> Vec<(TokenKind, &str)> {
+    let tokens = tokenize(FileId(0), text);
+    tokens.into_iter().map(|token| (token.kind, &text[token.span.range()])).collect()
+}
+
 /// Kind and length of the token that `rest` (not empty) begins with; at the beginning of a file only
 /// blanks and line ends stand before it.
 fn next_token(rest: &str, is_beginning: bool) -> (TokenKind, usize) {

@@ -20,6 +20,7 @@ pub mod words;
 
 pub use bounds::{MAX_EXPRESSION_DEPTH, MAX_FILE_BYTES, MAX_NESTING};
 pub use format::format;
+pub use lexer::tokens;
 pub use parse::{EDITION, parse};
 pub use setting::parse_setting;
 pub use words::{RESERVED_WORDS, STATEMENT_KEYWORDS};

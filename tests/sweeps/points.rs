@@ -115,3 +115,38 @@ fn axes_can_be_given_on_the_command_line() {
     folder.lamella(&["sweep", "s.lam"]).exits(2).says("[F120]").says("the scene has no sweep");
     folder.lamella(&["status", "nowhere"]).exits(2).says("[F121]");
 }
+
+#[test]
+fn why_names_the_line() {
+    let folder = run_once();
+    folder.lamella(&["why", "out", "0"]).exits(0).gives("will not run: complete since");
+    let text = scene_with(SWEEP).replace("run to 4 s, step 1 s", "run to 4 s, step 500 ms");
+    folder.write("s.lam", &text);
+    let why = folder.lamella(&["why", "out", "3/1"]).exits(0);
+    let why = why.gives("point 3/1 (D=0.001 m^2/s, c0=1 mol/m^3)");
+    let why = why.gives("will run: `time.n_steps` was 4 and is 8").says("[F124]");
+    why.says("run to 4 s, step 500 ms").says("run to 4 s, step 1 s").says("as it was run");
+    folder.write("s.lam", scene_with("  D 5e-4 m^2/s\n  c0 1 mol/m^3"));
+    folder.lamella(&["why", "out", "0"]).exits(0).gives("no point with these values was ever run");
+    folder.lamella(&["why", "out", "1"]).exits(2).says("[F122]");
+}
+
+#[test]
+fn points_can_be_verified_and_repeated() {
+    let folder = run_once();
+    folder.lamella(&["verify", "out"]).exits(0).gives("12 replicates run again: the same bytes");
+    folder.lamella(&["verify", "out", "--sample", "2"]).exits(0).gives("4 replicates run again");
+    let points = lamella::table::read::points(&folder.path("out/points.parquet")).unwrap();
+    let last = points.last().unwrap();
+    let name = format!("{}/{}", last.point, last.replicate);
+    let alone = folder.lamella(&["repro", "out", &name, "--out", "alone"]).exits(0).gives(&last.key);
+    assert!(alone.stderr.contains("the same by hand: lamella run s.lam"), "{}", alone.stderr);
+    // A run of its own can be verified, too, with what the command line set.
+    folder.lamella(&["verify", "alone"]).exits(0).gives("the same bytes in all data files");
+    let path = folder.path("alone/total/part-0000.parquet");
+    let mut bytes = std::fs::read(&path).unwrap();
+    bytes[100] ^= 1;
+    std::fs::write(&path, bytes).unwrap();
+    folder.lamella(&["verify", "alone"]).exits(1).says("[F123]").says("total/part-0000.parquet");
+    folder.lamella(&["verify", "nowhere"]).exits(2).says("[F121]");
+}

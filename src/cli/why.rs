@@ -1,0 +1,137 @@
+//! `lamella why`: whether a point will run again, and which line of the scene is behind it.
+
+use super::sweep::pool;
+use super::sweep_folder::{Which, journals, newest, point_of};
+use super::text::date;
+use super::{CommandResult, Exit, Stopped, Terminal, load, machine};
+use lamella::diagnostic::{Diagnostic, codes};
+use lamella::sweep::journal::Entry;
+use lamella::sweep::why::{Difference, changes, difference};
+use lamella::sweep::{Journal, Points, key_text};
+use std::path::{Path, PathBuf};
+
+/// Say why a point of a sweep will run again, or why it will not
+#[derive(clap::Args)]
+pub(crate) struct Arguments {
+    /// Folder of the sweep
+    folder: PathBuf,
+    /// Number of the point, with that of a replicate: 12 or 12/3
+    point: Which,
+    /// Scene file of today [default: the one that was run]
+    #[arg(long, value_name = "FILE")]
+    scene: Option<PathBuf>,
+}
+
+pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
+    let journals = journals(&arguments.folder)?;
+    let Some(session) = newest(&journals) else { return Ok(Exit::SceneWrong) };
+    let path = arguments.scene.clone().unwrap_or_else(|| PathBuf::from(&session.sources[0].0));
+    let Some(now) = load::load_session_at(session, &path, terminal)? else { return Ok(Exit::SceneWrong) };
+    let points = pool(machine::n_threads())?.install(|| Points::of(&now.scene));
+    let point = point_of(&points, arguments.point)?;
+    let name = now.scene.name(point.combination);
+    let Which { point: number, replicate } = arguments.point;
+    let (_, compiled) =
+        now.scene.compile(point.combination).map_err(|message| Stopped { exit: Exit::Failed, message })?;
+    let (plan, key) = now.scene.replicate(&compiled.plan, point.combination, replicate);
+    let mut text = format!("point {number}/{replicate} ({name})\nkey {}\n", key_text(&key));
+    if let Some((journal, entry)) = find(&journals, &key) {
+        text += &known(journal, entry)?;
+        terminal.product(&text)?;
+        return Ok(Exit::Done);
+    }
+    let Some((old, old_plan)) = counterpart(&journals, &now, point.combination, replicate)? else {
+        text += "will run: no point with these values was ever run\n";
+        terminal.product(&text)?;
+        return Ok(Exit::Done);
+    };
+    let Some(found) = difference(&old_plan, &plan) else {
+        text += "will run: the plan is that of a recorded point, but its frame is damaged\n";
+        terminal.product(&text)?;
+        return Ok(Exit::Done);
+    };
+    text += &format!("will run: `{}` was {} and is {}\n", found.path, found.before, found.now);
+    terminal.product(&text)?;
+    show(&old, &now, &found, terminal);
+    Ok(Exit::Done)
+}
+
+fn find<'j>(journals: &'j [Journal], key: &lamella::sweep::Key) -> Option<(&'j Journal, Entry)> {
+    let found = journals.iter().filter_map(|journal| Some((journal, journal.entry(key)?)));
+    found.min_by_key(|(_, entry)| !entry.is_done())
+}
+
+fn known(journal: &Journal, entry: Entry) -> Result<String, Stopped> {
+    let recorded = journal.replicate(entry).map_err(|error| super::sweep::failed(&error))?;
+    let when = date(recorded.row.finished);
+    Ok(match (&recorded.row.error_code, &recorded.row.error_message) {
+        (None, _) => format!("will not run: complete since {when}, version {}\n", recorded.row.version),
+        (Some(code), message) => {
+            let message = message.as_deref().unwrap_or_default();
+            format!("will run: it failed on {when} with {code}: {message}\n")
+        }
+    })
+}
+
+/// The newest session that ran a point with the same values, with that point's plan.
+fn counterpart(
+    journals: &[Journal],
+    now: &load::Sweep,
+    combination: u64,
+    replicate: u32,
+) -> Result<Option<(load::Sweep, lamella::plan::Plan)>, Stopped> {
+    let wanted = now.scene.assignments(combination);
+    let mut sessions: Vec<(&Journal, usize)> = journals
+        .iter()
+        .flat_map(|journal| (0..journal.sessions.len()).map(move |idx| (journal, idx)))
+        .collect();
+    sessions.sort_by_key(|(journal, idx)| std::cmp::Reverse(journal.sessions[*idx].started));
+    for (journal, idx) in sessions {
+        let Some(old) = load::load_session(&journal.sessions[idx])? else { continue };
+        let n = old.scene.n_combinations();
+        let Some(same) = (0..n).find(|&other| old.scene.assignments(other) == wanted) else { continue };
+        let Ok((_, compiled)) = old.scene.compile(same) else { continue };
+        let (plan, key) = old.scene.replicate(&compiled.plan, same, replicate);
+        if find(journals, &key).is_some() {
+            return Ok(Some((old, plan)));
+        }
+    }
+    Ok(None)
+}
+
+/// The lines behind the difference, in the scene of today and in the one that was run.
+fn show(old: &load::Sweep, now: &load::Sweep, found: &Difference, terminal: &Terminal) {
+    let mut sources = now.scene.sources.clone();
+    let shift: Vec<_> = old
+        .scene
+        .sources
+        .files()
+        .map(|(id, file)| (id, sources.add(format!("{} as it was run", file.name), file.text.clone())))
+        .collect();
+    let moved = |mut span: lamella::source::Span| {
+        if let Some((_, to)) = shift.iter().find(|(from, _)| *from == span.file) {
+            span.file = *to;
+        }
+        span
+    };
+    let all =
+        changes((&old.scene.file, &old.scene.sources), (&now.scene.file, &now.scene.sources), &found.path);
+    for change in all.iter().take(3) {
+        let message = Diagnostic::remark(codes::F124, format!("this can be behind `{}`", found.path));
+        let message = match (change.now, change.before) {
+            (Some(now), Some(before)) => message.at(now, "now").also(moved(before), "as it was run"),
+            (Some(now), None) => message.at(now, "new since then"),
+            (None, Some(before)) => message.at(moved(before), "there no more"),
+            (None, None) => continue,
+        };
+        terminal.diagnostics(&[message], &sources);
+    }
+    if all.is_empty() {
+        terminal.remark("the scene is written as it was: a setting, the seed or the version is another one");
+    }
+}
+
+/// Whether a path is the folder of a sweep.
+pub(crate) fn is_sweep(folder: &Path) -> bool {
+    folder.join("journal").is_dir()
+}
