@@ -5,7 +5,7 @@ use super::{CommandResult, Exit, Stopped, Terminal};
 use lamella::diagnostic::{Diagnostic, codes};
 use lamella::report::{self, ReportError};
 use lamella::table::TableError;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Draw report.html from the tables of a run or a sweep
 #[derive(clap::Args)]
@@ -15,31 +15,44 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
-    let page = report::report(&arguments.folder).map_err(|error| failed(&error))?;
-    let numbers = arguments.folder.join("report");
-    std::fs::create_dir_all(&numbers)
-        .map_err(|error| super::files::unwritable(&numbers, &error.to_string()))?;
-    remove_earlier(&numbers);
-    for (name, text) in &page.files {
-        write_whole(&numbers.join(name), text)?;
-    }
-    let path = arguments.folder.join("report.html");
-    write_whole(&path, &page.html)?;
+    let written = write(&arguments.folder)?;
     if !terminal.is_quiet() {
-        let (path, numbers) = (path.display().to_string(), numbers.display().to_string());
+        let (path, numbers) = (written.page.display().to_string(), written.numbers.display().to_string());
         let text = if terminal.is_json() {
-            let files: Vec<&String> = page.files.iter().map(|(name, _)| name).collect();
-            serde_json::json!({ "report": path, "folder": numbers, "files": files }).to_string() + "\n"
+            serde_json::json!({ "report": path, "folder": numbers, "files": written.files }).to_string()
+                + "\n"
         } else {
-            format!("report:   {path}\nnumbers:  {numbers} ({} CSV files)\n", page.files.len())
+            format!("report:   {path}\nnumbers:  {numbers} ({} CSV files)\n", written.files.len())
         };
         terminal.product(&text)?;
     }
     Ok(Exit::Done)
 }
 
+/// What a report consists of.
+pub(crate) struct Written {
+    pub(crate) page: PathBuf,
+    numbers: PathBuf,
+    files: Vec<String>,
+}
+
+/// Draws the report of a folder into it.
+pub(crate) fn write(folder: &Path) -> Result<Written, Stopped> {
+    let page = report::report(folder).map_err(|error| failed(&error))?;
+    let numbers = folder.join("report");
+    std::fs::create_dir_all(&numbers)
+        .map_err(|error| super::files::unwritable(&numbers, &error.to_string()))?;
+    remove_earlier(&numbers);
+    for (name, text) in &page.files {
+        write_whole(&numbers.join(name), text)?;
+    }
+    let path = folder.join("report.html");
+    write_whole(&path, &page.html)?;
+    Ok(Written { page: path, numbers, files: page.files.into_iter().map(|(name, _)| name).collect() })
+}
+
 /// Numbers of an earlier report that this one may not have; other files stay.
-fn remove_earlier(folder: &std::path::Path) {
+fn remove_earlier(folder: &Path) {
     for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
         let path = entry.path();
         let name = path.file_name().unwrap_or_default().to_string_lossy();

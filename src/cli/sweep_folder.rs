@@ -151,14 +151,15 @@ pub(crate) fn gather_and_tell(
     let gathered = gather.write(out).map_err(|error| match &error {
         GatherError::Journal(_) | GatherError::Table(_) | GatherError::Description(_) => failed(&error),
     })?;
+    let report = super::report::write(out)?;
     if !terminal.is_quiet() {
-        terminal.product(&summary(&gathered, out))?;
+        terminal.product(&summary(&gathered, out, &report.page))?;
     }
     let is_well = gathered.is_met() && gathered.n_failed == 0 && gathered.n_missing == 0;
     Ok(if is_well { Exit::Done } else { Exit::Failed })
 }
 
-fn summary(gathered: &Gathered, out: &Path) -> String {
+fn summary(gathered: &Gathered, out: &Path, report: &Path) -> String {
     let mut lines = vec![
         ("points", grouped(gathered.n_points)),
         ("replicates", format!("{} done, {} failed", grouped(gathered.n_done), grouped(gathered.n_failed))),
@@ -175,6 +176,7 @@ fn summary(gathered: &Gathered, out: &Path) -> String {
         lines.push(("expected", format!("{}: {verdict} ({})", expectation.text, expectation.detail)));
     }
     lines.push(("results", out.display().to_string()));
+    lines.push(("report", report.display().to_string()));
     lines.into_iter().map(|(name, text)| format!("{name:<12}{text}\n")).collect()
 }
 

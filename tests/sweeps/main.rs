@@ -39,7 +39,9 @@ pub fn scene_with(sweep: &str) -> String {
 pub fn data_files(folder: &Folder, out: &str) -> Vec<(String, Vec<u8>)> {
     let inside = format!("{out}/");
     let names = folder.files().into_iter().filter(|name| name.starts_with(&inside));
-    let names = names.filter(|name| !name.contains("/journal/") && !name.ends_with("/points.parquet"));
+    // The report shows times and the machine.
+    let apart = ["/journal/", "/points.parquet", "/report"];
+    let names = names.filter(|name| !apart.iter().any(|part| name.contains(part)));
     names
         .map(|name| {
             let bytes = std::fs::read(folder.path(&name)).expect("a file of the folder can be read");
