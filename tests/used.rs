@@ -73,6 +73,12 @@ fn a_used_scene_runs_as_if_it_were_written_in_place() {
     // A title of the file that uses it comes first.
     let titled = check(&format!("{scene}\ntitle \"A study\"\n"), &[("column.lam", COLUMN)]);
     assert_eq!(titled.scenario.expect("a scene").title.as_deref(), Some("A study"));
+    // The only reference may be called so.
+    let short =
+        STUDY.replace("ALIAS", "column").replace("- exact", "- reference").replace("(exact)", "(reference)");
+    let short =
+        check(&format!("lamella 1\nuse \"column.lam\" as column\n{short}"), &[("column.lam", COLUMN)]);
+    assert_eq!(evaluation(&short), evaluation(&written));
     // Settings reach the parameters of the used scene.
     let set = Settings { set: vec![("D".to_owned(), "2e-9 m^2/s".to_owned())], ..Settings::default() };
     let set = check_with(&scene, &[("column.lam", COLUMN)], &set);

@@ -6,10 +6,10 @@ use super::expression::Type;
 use super::model::species_index;
 use super::observe::{OUTPUTS, time_list};
 use super::places::{Places, Results, place_of};
-use super::scope::Origin;
+use super::scope::THE_REFERENCE;
 use super::{Measure, Output, OutputKind, Reference};
 use crate::diagnostic::Diagnostic;
-use crate::diagnostic::codes::{D007, M015, U101, U103, U108};
+use crate::diagnostic::codes::{D004, D007, M015, U101, U103, U108};
 use crate::maths::operator::{Binary, Unary};
 use crate::source::Span;
 use crate::syntax::tree::{self, BinaryOperator, ExprKind, UnaryOperator};
@@ -225,11 +225,15 @@ fn path_part<'a>(
                 Places::default(),
             ));
         }
-        if let Some(entry) = checker.scope.get_mut(&name.value)
-            && let Origin::Reference(idx) = entry.origin
-        {
-            entry.n_uses += 1;
+        if let Some(idx) = checker.scope.reference(&name.value) {
+            if let Some(entry) = checker.scope.get_mut(&name.value) {
+                entry.n_uses += 1;
+            }
             return reference_part(checker, results, idx, expr);
+        }
+        if name.value == THE_REFERENCE && checker.scope.get(THE_REFERENCE).is_none() {
+            report_no_only_reference(checker, name.span);
+            return None;
         }
         return constant(checker, expr);
     }
@@ -264,6 +268,20 @@ fn path_part<'a>(
         kind => kind.dimension(concentration, checker.axes.len()),
     };
     Some(Part::Field(Field::Output(kind, target), Type::Number(dimension), places))
+}
+
+fn report_no_only_reference(checker: &mut Checker<'_>, span: Span) {
+    let names: Vec<String> = checker.scope.references().iter().map(|(name, _)| format!("`{name}`")).collect();
+    let expected = match names.is_empty() {
+        true => "a `reference` statement".to_owned(),
+        false => names.join(", "),
+    };
+    checker.report(
+        Diagnostic::error(D004, "`reference` stands for the only reference of a scene")
+            .at(span, "not the only one")
+            .found(format!("{} references", names.len()))
+            .expected(expected),
+    );
 }
 
 fn reference_part(

@@ -164,8 +164,8 @@ impl Results<'_> {
             _ => None,
         };
         match path {
-            [name] => match origin(name) {
-                Some(Origin::Reference(idx)) if idx < self.references.len() => self.of_reference(idx),
+            [name] => match scope.reference(&name.value) {
+                Some(idx) if idx < self.references.len() => self.of_reference(idx),
                 _ => Places::default(),
             },
             [kind, names @ ..] => {

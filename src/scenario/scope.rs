@@ -77,6 +77,8 @@ pub(super) const BUILT_IN_FUNCTIONS: &[&str] = &[
     "exp", "ln", "log10", "sqrt", "abs", "min", "max", "tanh", "erf", "erfc", "sin", "cos", "pow", "l1",
     "l2", "linf", "rmse", "integral", "mean", "minimum", "maximum",
 ];
+/// What the only reference of a scene may be called in measures.
+pub(super) const THE_REFERENCE: &str = "reference";
 const RESERVED: &[(&str, &str)] = &[("t", "the time"), ("pi", "the number π"), ("instant", "a rate")];
 
 impl<'a> Scope<'a> {
@@ -140,6 +142,24 @@ impl<'a> Scope<'a> {
     /// Notes a use of a name that does not exist; [`Scope::report_undefined`] tells it.
     pub(super) fn note_undefined(&mut self, name: &str, span: Span) {
         self.undefined.entry(name.to_owned()).or_default().insert(span);
+    }
+
+    /// The reference that a name in a measure means: that of this name, or for `reference` the only one.
+    pub(super) fn reference(&self, name: &str) -> Option<usize> {
+        match (self.entries.get(name).map(|entry| entry.origin), &self.references()[..]) {
+            (Some(Origin::Reference(idx)), _) => Some(idx),
+            (None, [(_, idx)]) if name == THE_REFERENCE => Some(*idx),
+            _ => None,
+        }
+    }
+
+    /// All references by name.
+    pub(super) fn references(&self) -> Vec<(&str, usize)> {
+        let of = self.entries.iter().filter_map(|(name, entry)| match entry.origin {
+            Origin::Reference(idx) => Some((name.as_str(), idx)),
+            _ => None,
+        });
+        of.collect()
     }
 
     /// Whether something else uses a name that does not exist.
