@@ -12,7 +12,7 @@ use super::collect::Statements;
 use super::condition::{Condition, known_names};
 use super::{Measure, Parameter};
 use crate::diagnostic::Diagnostic;
-use crate::diagnostic::codes::{M002, W002, W007};
+use crate::diagnostic::codes::{M002, W001, W002, W007};
 use crate::source::Span;
 use crate::syntax::tree::{self, SweepEntry};
 use crate::units::Dimension;
@@ -157,7 +157,11 @@ pub(super) fn sweeps<'a>(
             );
             continue;
         }
-        list.extend(sweep(checker, *span, written, parameters, measures));
+        let sweep = sweep(checker, *span, written, parameters, measures);
+        if statements.average.is_none() {
+            bins_of_nothing(checker, sweep.as_ref());
+        }
+        list.extend(sweep);
     }
     let is_right = list.len() == statements.sweeps.len();
     (list, is_right)
@@ -269,6 +273,20 @@ fn bounded(checker: &mut Checker<'_>, sweep: &Sweep, span: Span) {
                 .found(format!("{n} combinations"))
                 .expected(format!("at most {MAX_POINTS}"))
                 .help("write axes that go together in `zip { … }`, or give them fewer values"),
+        );
+    }
+}
+
+/// An axis of bins would set nothing where the scene has no average.
+fn bins_of_nothing(checker: &mut Checker<'_>, sweep: Option<&Sweep>) {
+    let axes = sweep.into_iter().flat_map(|sweep| sweep.groups.iter().flatten());
+    for axis in axes.filter(|axis| axis.target == Target::Bins) {
+        checker.report(
+            Diagnostic::error(W001, "the scene has no bins that could be swept")
+                .at(axis.span, "of which average?")
+                .found("no `average bins`")
+                .expected("an `average bins` statement in the scene")
+                .help("add for example `average bins 100`"),
         );
     }
 }
