@@ -468,6 +468,12 @@ fn scripts_of_other_tools_find_the_same_order() {
     let folder = parent.path().join("it's a sweep");
     let law = Law { b: 0.01 };
     write(&folder, &law, false);
+    // sweep.json is what its published schema says.
+    let judge = "import json,sys,jsonschema; s,d=[json.load(open(p)) for p in sys.argv[1:]]; jsonschema.validate(d,s)";
+    let schema = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/schema/sweep-1.json");
+    let mut check = std::process::Command::new(&python);
+    let judged = check.args(["-c", judge]).arg(schema).arg(folder.join("sweep.json")).output().unwrap();
+    assert!(judged.status.success(), "{}", String::from_utf8_lossy(&judged.stderr));
     let slope = |step: f64| (law.error(10_000, step) / law.error(100, step)).ln() / (2.0 * 10f64.ln());
     let order = STEPS.map(slope).iter().sum::<f64>() / 3.0;
     for script in ["with_pandas.py", "with_polars.py", "with_duckdb.py"] {

@@ -95,7 +95,10 @@ impl Story<'_> {
         };
         let n_all = self.study.points.values().filter(|point| point.n_done > 0).count();
         let choice = match (self.points.len(), self.courses.first().and_then(|course| course.t)) {
-            (1, Some(_)) => format!("At most {MOST_TIMES} times are shown."),
+            (1, Some(_)) if self.times().len() == MOST_TIMES => {
+                format!("At most {MOST_TIMES} times are shown.")
+            }
+            (1, Some(_)) => String::new(),
             (1, None) => String::new(),
             (shown, Some(_)) => format!("{shown} of {n_all} points, each at its last time."),
             (shown, None) => format!("{shown} of {n_all} points."),

@@ -160,7 +160,7 @@ impl Gathered {
 }
 
 /// Bits that sort like the numbers.
-fn sorted_key(value: f64) -> u64 {
+pub fn sorted_key(value: f64) -> u64 {
     let bits = (value + 0.0).to_bits();
     if bits >> 63 == 1 { !bits } else { bits | 1 << 63 }
 }

@@ -9,6 +9,7 @@ mod convergence;
 mod courses;
 mod csv;
 mod html;
+mod maps;
 mod numbers;
 mod provenance;
 mod quantity;
@@ -104,7 +105,8 @@ pub fn report(folder: &Path) -> Result<Page, ReportError> {
             .into_iter()
             .for_each(|html| book.add("errors", "Errors against references", html));
     }
-    let (html, files) = bands::bands(folder, &study)?;
+    let (mut html, files) = bands::bands(folder, &study)?;
+    html += &maps::maps(folder, &study)?;
     if !html.is_empty() {
         book.add("results", "Results", html);
         book.files(files);
