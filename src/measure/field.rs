@@ -3,10 +3,9 @@
 //! Owns the arithmetic of field expressions. May use the other parts of `measure`. It deliberately
 //! interpolates nothing: fields of different grids do not mix.
 
-use super::grid::Grid;
-use super::observed::Run;
+use super::grid::{Grid, is_binned};
+use super::observed::{Observed, Run, column};
 use super::reference::Prepared;
-use crate::plan::Output;
 use crate::plan::evaluation::Field;
 
 /// Sums from which all norms follow.
@@ -48,15 +47,15 @@ impl Norms {
     }
 
     pub(super) fn l1(&self) -> f64 {
-        self.sum_of_sizes * self.weight
+        self.unless_empty(self.sum_of_sizes * self.weight)
     }
 
     pub(super) fn l2(&self) -> f64 {
-        (self.sum_of_squares * self.weight).sqrt()
+        self.unless_empty((self.sum_of_squares * self.weight).sqrt())
     }
 
     pub(super) fn l_inf(&self) -> f64 {
-        if self.count == 0 { 0.0 } else { largest(-self.minimum, self.maximum) }
+        self.unless_empty(largest(-self.minimum, self.maximum))
     }
 
     pub(super) fn rmse(&self) -> f64 {
@@ -68,15 +67,20 @@ impl Norms {
     }
 
     pub(super) fn integral(&self) -> f64 {
-        self.sum * self.weight
+        self.unless_empty(self.sum * self.weight)
     }
 
     pub(super) fn minimum(&self) -> f64 {
-        if self.count == 0 { f64::NAN } else { self.minimum }
+        self.unless_empty(self.minimum)
     }
 
     pub(super) fn maximum(&self) -> f64 {
-        if self.count == 0 { f64::NAN } else { self.maximum }
+        self.unless_empty(self.maximum)
+    }
+
+    /// A norm of nothing is undefined: an error of zero would read as perfect.
+    fn unless_empty(&self, value: f64) -> f64 {
+        if self.count == 0 { f64::NAN } else { value }
     }
 }
 
@@ -94,11 +98,13 @@ pub(super) struct Values {
 pub(super) struct AtTime {
     pub(super) t: f64,
     pub(super) values: Vec<f64>,
-    /// False where an output in the expression has no particles.
+    /// False where the norm's output, or another one in the expression, has no value.
     pub(super) is_filled: Vec<bool>,
 }
 
-/// The values of a field on the bins and times of an output.
+/// The values of a field on the bins and times of an output. Every part of the field lives there: a
+/// reference or a constant alone has no value where the output has none, or quotients of norms would
+/// compare different bins.
 pub(super) fn values(
     run: &Run,
     references: &[Prepared],
@@ -108,22 +114,25 @@ pub(super) fn values(
     let output = run.plan.outputs.get(output_idx).ok_or("the run does not have its output.")?;
     let series = run.series(output_idx, output.quantities[0])?;
     let n_bins = series.grid.n_bins();
-    let times = series
-        .times
-        .iter()
-        .map(|observed| AtTime { t: observed.t, values: vec![0.0; n_bins], is_filled: vec![true; n_bins] })
-        .collect();
-    let mut empty = Values { grid: series.grid, times };
-    fill(run, references, field, output, &mut empty)?;
-    Ok(empty)
+    // Without bins a value is missing for one pair and not for another: the parts tell which is meant.
+    let is_binned = is_binned(output.kind);
+    let blank = |observed: Observed| AtTime {
+        t: observed.t,
+        values: vec![0.0; n_bins],
+        is_filled: if is_binned { observed.is_filled } else { vec![true; n_bins] },
+    };
+    let times = series.times.into_iter().map(blank).collect();
+    let mut target = Values { grid: series.grid, times };
+    fill(run, references, field, output_idx, &mut target)?;
+    Ok(target)
 }
 
-/// Replaces the values of `target` by those of the field; bins without particles are marked.
+/// Replaces the values of `target` by those of the field on output `on`; bins without a value are marked.
 fn fill(
     run: &Run,
     references: &[Prepared],
     field: &Field,
-    on: &Output,
+    on: usize,
     target: &mut Values,
 ) -> Result<(), String> {
     match field {
@@ -133,7 +142,7 @@ fn fill(
             target.times.iter_mut().for_each(|time| time.values.copy_from_slice(&centres));
         }
         Field::Output(kind, quantity) => {
-            let output_idx = run.find(*kind, *quantity, on);
+            let output_idx = run.find(*kind, *quantity, run.output(on));
             let output_idx = output_idx.ok_or(
                 "no output of the run has that species or pair on the bins and times of the others.",
             )?;
@@ -142,14 +151,19 @@ fn fill(
                 return Err("it combines outputs whose times differ.".into());
             }
             for (time, observed) in target.times.iter_mut().zip(series.times) {
-                time.values = observed.values;
-                time.is_filled = observed.is_filled;
+                time.values.clone_from(&observed.values);
+                time.mask(&observed);
             }
         }
         Field::Reference(idx) => {
+            let reference = references.get(*idx).ok_or("it uses a reference that does not exist.")?;
             for time in &mut target.times {
-                let reference = references.get(*idx).ok_or("it uses a reference that does not exist.")?;
                 time.values = reference.bin_means(time.t, &target.grid);
+            }
+            let quantity = reference.reference.target;
+            if column(run.output(on), quantity).is_some() {
+                let series = run.series(on, quantity)?;
+                target.times.iter_mut().zip(&series.times).for_each(|(time, observed)| time.mask(observed));
             }
         }
         Field::Unary(operator, a) => {
@@ -167,13 +181,20 @@ fn fill(
     Ok(())
 }
 
+impl AtTime {
+    /// Leaves out what another result leaves out.
+    fn mask(&mut self, observed: &Observed) {
+        self.is_filled.iter_mut().zip(&observed.is_filled).for_each(|(own, other)| *own &= other);
+    }
+}
+
 impl Values {
-    /// The same bins and times without values.
+    /// The same bins and times without values of the field.
     fn blank(&self) -> Self {
         let times = self.times.iter().map(|time| AtTime {
             t: time.t,
             values: vec![0.0; time.values.len()],
-            is_filled: vec![true; time.values.len()],
+            is_filled: time.is_filled.clone(),
         });
         Self { grid: self.grid.clone(), times: times.collect() }
     }

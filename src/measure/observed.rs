@@ -19,7 +19,7 @@ pub(super) struct Observed {
     pub(super) t: f64,
     pub(super) values: Vec<f64>,
     pub(super) standard_errors: Option<Vec<f64>>,
-    /// False for a bin that no particle was in.
+    /// False for a bin that too few particles were in for a value.
     pub(super) is_filled: Vec<bool>,
 }
 
@@ -73,9 +73,9 @@ fn observed(snapshot: &Snapshot, column: usize, n_bins: usize) -> Result<Observe
     let found = match &snapshot.values {
         Values::Binned { mean, standard_error, n_particles } => mean
             .get(column)
-            .map(|mean| (mean.clone(), standard_error.get(column).cloned(), filled(n_particles))),
+            .map(|mean| (mean.clone(), standard_error.get(column).cloned(), filled(n_particles, 1))),
         Values::Covariance { covariance, n_particles } => {
-            covariance.get(column).map(|values| (values.clone(), None, filled(n_particles)))
+            covariance.get(column).map(|values| (values.clone(), None, filled(n_particles, 2)))
         }
         Values::Total { amount } => single(amount.get(column).copied()),
         // γ has no value where nothing is mixed yet (M_mean = 0 but for rounding): left out like an empty bin.
@@ -92,6 +92,6 @@ fn observed(snapshot: &Snapshot, column: usize, n_bins: usize) -> Result<Observe
     }
 }
 
-fn filled(n_particles: &[u64]) -> Vec<bool> {
-    n_particles.iter().map(|&n| n > 0).collect()
+fn filled(n_particles: &[u64], needed: u64) -> Vec<bool> {
+    n_particles.iter().map(|&n| n >= needed).collect()
 }
