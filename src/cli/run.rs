@@ -273,6 +273,7 @@ fn run_failed(error: &RunError) -> Stopped {
         | RunError::NonFinitePosition { .. }
         | RunError::NonFiniteConcentration { .. }
         | RunError::NegativeConcentration { .. }
+        | RunError::NonFiniteOutput { .. }
         | RunError::MassLost { .. } => (Exit::Failed, codes::R102),
         RunError::OutOfMemory { .. } | RunError::Threads(_) => (Exit::Failed, codes::R103),
         RunError::Plan(_) => (Exit::Failed, codes::R104),

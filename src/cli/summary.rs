@@ -76,7 +76,7 @@ impl Summary<'_> {
                 "other time",
                 format!("plan {}, writing {}", duration(self.compile_wall), duration(self.write_wall)),
             ),
-            ("mass defect", format!("{} relative", significant(self.mass_defect(), 2))),
+            ("mass defect", format!("{} relative", shown(Some(self.outcome.worst_defect()), 2))),
             ("memory", self.memory()),
             ("plan", self.plan_hash.to_owned()),
             ("results", self.folder.display().to_string()),
@@ -107,10 +107,6 @@ impl Summary<'_> {
         (n > 0.0).then(|| 1e9 * self.outcome.loop_wall / n)
     }
 
-    fn mass_defect(&self) -> f64 {
-        self.outcome.mass_defect.iter().copied().fold(0.0, f64::max)
-    }
-
     /// One object on one line.
     pub(crate) fn json(&self) -> String {
         let summary = JsonSummary {
@@ -125,7 +121,7 @@ impl Summary<'_> {
             compile_wall: self.compile_wall,
             write_wall: self.write_wall,
             ns_per_particle_step: self.ns_per_particle_step(),
-            mass_defect: self.mass_defect(),
+            mass_defect: self.outcome.worst_defect(),
             threads: self.n_threads,
             state_bytes: self.outcome.state_bytes,
             peak_memory: self.peak_memory,

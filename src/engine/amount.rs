@@ -58,6 +58,11 @@ pub fn amounts<const D: usize>(blocks: &[Block<D>], n_columns: usize) -> Vec<Amo
     amounts
 }
 
+/// The larger of two defects; one that is no number is the worst, and must not be passed over.
+pub fn worse(a: f64, b: f64) -> f64 {
+    if a.is_nan() || a > b { a } else { b }
+}
+
 /// Largest relative change per component over its conserved columns.
 pub fn defects<const D: usize>(program: &Program<D>, before: &[Amount], sums: &[f64]) -> Vec<f64> {
     let n_slots = program.roles.len();
@@ -67,7 +72,7 @@ pub fn defects<const D: usize>(program: &Program<D>, before: &[Amount], sums: &[
             let column = component * n_slots + slot;
             Amount::defect_of(sums[column], &before[column])
         };
-        columns.map(of_slot).fold(0.0, f64::max)
+        columns.map(of_slot).fold(0.0, worse)
     };
     (0..program.n_components()).map(of_component).collect()
 }

@@ -1,9 +1,10 @@
 //! What can stop a run, in words that name the step, the particle and the component.
 //!
-//! Owns the run's errors. May use the numbers of `diagnostic`. It deliberately holds no spans: a plan
+//! Owns the run's errors. May use the numbers of `diagnostic` and the kinds of outputs. It deliberately holds no spans: a plan
 //! has none.
 
 use crate::diagnostic::precise;
+use crate::plan::OutputKind;
 use std::fmt;
 
 /// Why a run stopped. Steps count from 1, as the first step leads from time 0 to the first time;
@@ -37,6 +38,13 @@ pub enum RunError {
         component: String,
         /// Not finite if the values are numbers and their sum is none.
         defect: f64,
+    },
+    /// An amount, a mean or a product that numbers cannot hold, of values that are numbers.
+    NonFiniteOutput {
+        t: f64,
+        kind: OutputKind,
+        /// The species, or the pair.
+        quantity: String,
     },
     OutOfMemory {
         bytes: u64,
@@ -85,6 +93,10 @@ impl fmt::Display for RunError {
                     "step {step}: the amount of `{component}` changed by {} of itself",
                     precise(*defect)
                 )
+            }
+            Self::NonFiniteOutput { t, kind, quantity } => {
+                let (kind, t) = (kind.word(), precise(*t));
+                write!(f, "`{kind} {quantity}` at {t} s is larger than numbers can hold (1.8e308 in SI)")
             }
             Self::OutOfMemory { bytes } => write!(f, "no memory for {bytes} bytes of particles"),
             Self::Threads(what) => write!(f, "the threads could not be started: {what}"),

@@ -28,6 +28,27 @@ pub enum Values {
     Particles { positions: Vec<Vec<f64>>, concentrations: Vec<Vec<f64>> },
 }
 
+impl Values {
+    /// The first column with a value beyond all numbers. What is undefined, as the mean of an empty bin,
+    /// is no overflow.
+    pub fn overflow(&self) -> Option<usize> {
+        let has_infinite = |columns: &[Vec<f64>]| {
+            columns.iter().position(|column| column.iter().any(|value| value.is_infinite()))
+        };
+        match self {
+            Self::Binned { mean, .. } => has_infinite(mean),
+            Self::Covariance { covariance, n_particles } => covariance.iter().position(|column| {
+                column.iter().zip(n_particles).any(|(value, &n)| n > 1 && !value.is_finite())
+            }),
+            Self::Total { amount } => amount.iter().position(|value| !value.is_finite()),
+            Self::Mixing(states) => states.iter().position(|state| {
+                [state.m, state.m_mean, state.m_cov].iter().any(|value| value.is_infinite())
+            }),
+            Self::Particles { concentrations, .. } => has_infinite(concentrations),
+        }
+    }
+}
+
 /// M = M_mean + M_cov and γ = M_cov / M_mean of one pair.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MixingState {
@@ -50,4 +71,11 @@ pub struct Outcome {
     pub cpu: f64,
     /// Bytes of particle state.
     pub state_bytes: u64,
+}
+
+impl Outcome {
+    /// The largest defect of all components; not a number if one of them is none.
+    pub fn worst_defect(&self) -> f64 {
+        self.mass_defect.iter().copied().fold(0.0, super::amount::worse)
+    }
 }

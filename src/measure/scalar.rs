@@ -97,9 +97,7 @@ fn value_of(fact: Fact, outcome: &Outcome) -> f64 {
     match fact {
         Fact::WallTime => outcome.wall,
         Fact::CpuTime => outcome.cpu,
-        Fact::MassDefect => {
-            outcome.mass_defect.iter().copied().fold(0.0, |a, b| if a.is_nan() || a > b { a } else { b })
-        }
+        Fact::MassDefect => outcome.worst_defect(),
         Fact::Particles => outcome.n_particles as f64,
         Fact::Steps => outcome.n_steps as f64,
     }

@@ -32,6 +32,16 @@ fn an_overflow_of_positions_names_the_step() {
     assert_eq!(failure(&plan), RunError::NonFinitePosition { step: 2, particle: 0 });
 }
 
+/// Every value is a number, the amount of all particles is none.
+#[test]
+fn an_overflow_of_an_amount_names_the_species() {
+    let mut plan = front(1000, 10, 10.0, 1.0);
+    plan.outputs = front_outputs(10, vec![5.0], vec![5.0, 10.0]);
+    plan.particles.volume = f64::MAX;
+    let quantity = plan.species[2].name.clone();
+    assert_eq!(failure(&plan), RunError::NonFiniteOutput { t: 5.0, kind: OutputKind::Total, quantity });
+}
+
 #[test]
 fn plans_that_contradict_themselves_are_refused() {
     let spoil: [fn(&mut Plan); 14] = [

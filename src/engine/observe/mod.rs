@@ -16,7 +16,7 @@ use super::program::unsound;
 use super::run::Run;
 use super::schedule::Due;
 use super::snapshot::{Snapshot, Values};
-use crate::plan::{Output, OutputKind, Quantity};
+use crate::plan::{Output, OutputKind, Plan, Quantity};
 use crate::state::grid::Grid;
 use chemistry::Needs;
 pub use lab::{Instant, Lab};
@@ -54,12 +54,27 @@ pub fn observe<const D: usize>(
     }
     let needs = Needs::of(program, &due.outputs);
     let values = sum(run, instant, &means, &needs, &tallies);
-    let snapshot = |(&output_idx, values)| Snapshot {
-        output_idx,
-        t: due.t,
-        values: listed_only(values, &program.plan.outputs[output_idx]),
+    let snapshot = |(&output_idx, values)| {
+        let output = &program.plan.outputs[output_idx];
+        let values = listed_only(values, output);
+        match values.overflow() {
+            Some(column) => Err(overflow(program.plan, output, column, due.t)),
+            None => Ok(Snapshot { output_idx, t: due.t, values }),
+        }
     };
-    Ok(due.outputs.iter().zip(values).map(snapshot).collect())
+    due.outputs.iter().zip(values).map(snapshot).collect()
+}
+
+/// Particles may have values that are numbers and sums, products or amounts that are none.
+#[cold]
+fn overflow(plan: &Plan, output: &Output, column: usize, t: f64) -> RunError {
+    let name = |idx: usize| plan.species.get(idx).map_or("?", |species| species.name.as_str());
+    let quantity = match output.quantities.get(column) {
+        Some(Quantity::Species(a)) => name(*a).to_owned(),
+        Some(Quantity::Pair(a, b)) => format!("{}, {}", name(*a), name(*b)),
+        None => "?".to_owned(),
+    };
+    RunError::NonFiniteOutput { t, kind: output.kind, quantity }
 }
 
 /// Particles carry a column for each species of the plan; an output has those that it lists.
