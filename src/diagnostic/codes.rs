@@ -117,7 +117,7 @@ codes! {
     N102 "the step is coarse for a mixing zone",
     N103 "the bins add dispersion",
     N104 "a step carries particles across the whole domain",
-    N105 "the flow empties the domain",
+    N105 "the domain runs empty at a side",
     N201 "bins without particles",
     N202 "a step cannot resolve a mixing zone",
     N203 "the bins disperse more than the scene",

@@ -5,6 +5,9 @@
 /// A number as people read it: few digits, no exponent where it is short without.
 pub fn number(value: f64) -> String {
     let magnitude = value.abs();
+    if !value.is_finite() {
+        return value.to_string();
+    }
     if value == 0.0 || (1e-3..1e6).contains(&magnitude) {
         let text = format!("{value:.6}");
         let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
@@ -40,6 +43,7 @@ mod tests {
         let shown = [0.0, -0.0, -1.0, 1.0 - 1.2, 1.0 + 1e-9, 7000.0, 1e8, 1e11, 1e300, -1e-30].map(precise);
         let want = ["0", "0", "-1", "-0.2", "1.000000001", "7000", "100000000", "1e11", "1e300", "-1e-30"];
         assert_eq!(shown, want);
+        assert_eq!([f64::INFINITY, f64::NEG_INFINITY, f64::NAN].map(number), ["inf", "-inf", "NaN"]);
         assert_eq!([f64::INFINITY, f64::NAN, f64::MAX].map(precise), ["inf", "NaN", "1.79769313486e308"]);
     }
 }

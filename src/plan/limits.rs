@@ -5,9 +5,9 @@
 
 use super::cost::{self, Cost};
 use super::passes::Draft;
-use super::{Plan, Side, ZoneRate};
-use crate::diagnostic::codes::{N101, N102, N103, N104, N105, N201, N202, N203, N301};
-use crate::diagnostic::{Diagnostic, number};
+use super::{Plan, ZoneRate, edges};
+use crate::diagnostic::codes::{N101, N102, N103, N104, N201, N202, N203, N301};
+use crate::diagnostic::{Diagnostic, number, precise};
 use crate::scenario::{MAX_BINS, Scenario};
 use crate::source::Span;
 use serde::Serialize;
@@ -27,10 +27,10 @@ const TOO_FEW_PER_BIN: f64 = 2.0;
 /// χΔt above which splitting shows, and above which the covariance of a zone is lost in one step.
 const LARGE_EXCHANGE: f64 = 0.2;
 const TOO_LARGE_EXCHANGE: f64 = 2.0;
-/// Share of the domain that may run empty before it is said.
-const SMALL_EMPTY_SHARE: f64 = 0.01;
 /// Numerical dispersion of the bins against the physical one.
 const VISIBLE_DISPERSION: f64 = 0.02;
+/// Standard deviation by which the bins spread in a run, against the extent, where nothing else disperses.
+const VISIBLE_SPREADING: f64 = 0.01;
 
 /// Works all limits out; diagnostics tell of those that are passed.
 pub fn check(
@@ -43,7 +43,7 @@ pub fn check(
     let mut limits = Vec::new();
     let mut diagnostics = Vec::new();
     travel(scenario, plan, &mut limits, &mut diagnostics);
-    emptying(scenario, plan, &mut diagnostics);
+    edges::check(scenario, plan, &mut diagnostics);
     if plan.mixing.is_some() {
         particles_per_bin(scenario, plan, &mut limits, &mut diagnostics);
         exchange(scenario, plan, &mut limits, &mut diagnostics);
@@ -53,18 +53,23 @@ pub fn check(
     (limits, diagnostics)
 }
 
-fn axis_name(index: usize) -> &'static str {
+pub(super) fn axis_name(index: usize) -> &'static str {
     ["x", "y", "z"][index]
 }
 
 /// Standard deviation of one step along an axis, m.
 fn spread_length(plan: &Plan, axis_idx: usize, step: f64) -> f64 {
     let row = &plan.walk.spread[axis_idx * (axis_idx + 1) / 2..][..=axis_idx];
-    (row.iter().map(|b| b * b).sum::<f64>() * step).sqrt()
+    // Relative to the largest entry, as squares of the largest and smallest numbers are none.
+    let largest = row.iter().fold(0.0, |largest: f64, b| largest.max(b.abs()));
+    if largest == 0.0 {
+        return 0.0;
+    }
+    largest * row.iter().map(|b| (b / largest) * (b / largest)).sum::<f64>().sqrt() * step.sqrt()
 }
 
 /// Dispersion coefficient along an axis, m²/s.
-fn dispersion(plan: &Plan, axis_idx: usize) -> f64 {
+pub(super) fn dispersion(plan: &Plan, axis_idx: usize) -> f64 {
     0.5 * spread_length(plan, axis_idx, 1.0).powi(2)
 }
 
@@ -98,42 +103,13 @@ fn travel(scenario: &Scenario, plan: &Plan, limits: &mut Vec<Limit>, diagnostics
                         axis_name(axis.index)
                     ),
                 )
-                .at(scenario.run.step_span, format!("{step} s"))
+                .at(scenario.run.step_span, format!("{} s", precise(step)))
                 .found(format!("{} m in a step", short(advective + 3.0 * dispersive)))
                 .expected(format!("less than the extent, {} m", short(extent)))
                 .note("positions stay right in law; what happens between two outputs is not resolved")
                 .help("use a shorter step, or a `frame` that moves with the flow"),
             );
         }
-    }
-}
-
-/// An open side upstream lets nothing in: the flow carries the edge of the fluid into the domain.
-fn emptying(scenario: &Scenario, plan: &Plan, diagnostics: &mut Vec<Diagnostic>) {
-    for (axis, drift) in plan.axes.iter().zip(&plan.walk.drift) {
-        let upstream = if *drift > 0.0 { axis.low_side } else { axis.high_side };
-        let share = drift.abs() * plan.time.duration / (axis.high - axis.low);
-        let Some(written) = scenario.domain.axes.iter().find(|written| written.index == axis.index) else {
-            continue;
-        };
-        if upstream != Side::Open || share <= SMALL_EMPTY_SHARE {
-            continue;
-        }
-        let end = if share < 1.0 { plan.time.duration } else { plan.time.duration / share };
-        let percent = short(100.0 * share.min(1.0));
-        let place = if *drift > 0.0 { written.low_side_span } else { written.high_side_span };
-        let name = axis_name(axis.index);
-        diagnostics.push(
-            Diagnostic::warning(N105, format!("the flow along {name} empties the domain: nothing comes in"))
-                .at(place, format!("{percent} % of the domain is empty after {} s", short(end)))
-                .found(format!("an open side upstream, {} m/s across it", short(drift.abs())))
-                .expected(format!("at most {} % empty at the end", short(100.0 * SMALL_EMPTY_SHARE)))
-                .note("an open side lets particles out; inflow is not in this version")
-                .help(format!(
-                    "let the frame move with the flow (`frame moving v`), begin the domain {} m further upstream, or end the run earlier",
-                    short(drift.abs() * plan.time.duration)
-                )),
-        );
     }
 }
 
@@ -224,37 +200,44 @@ fn exchange(scenario: &Scenario, plan: &Plan, limits: &mut Vec<Limit>, diagnosti
 
 /// A step of two figures, not above the given one, as text of the language.
 fn round_down(seconds: f64) -> String {
-    let scale = 10f64.powi(seconds.log10_floor() - 1);
-    let rounded = (seconds / scale * (1.0 + 1e-12)).floor() * scale;
-    format!("{} s", number(rounded))
+    format!("{} s", number(rounded(seconds, 2, -1)))
 }
 
 /// Three figures, not below the given value.
 fn short_up(value: f64) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return number(value);
-    }
-    let scale = 10f64.powi(value.abs().log10_floor() - 2);
-    number((value / scale * (1.0 - 1e-12)).ceil() * scale)
+    number(rounded(value, 3, 1))
 }
 
 /// Three figures are enough for a message.
-fn short(value: f64) -> String {
-    if value == 0.0 || !value.is_finite() {
-        return number(value);
-    }
-    let scale = 10f64.powi(value.abs().log10_floor() - 2);
-    number((value / scale).round() * scale)
+pub(super) fn short(value: f64) -> String {
+    number(rounded(value, 3, 0))
 }
 
-trait Log10Floor {
-    fn log10_floor(self) -> i32;
-}
-
-impl Log10Floor for f64 {
-    fn log10_floor(self) -> i32 {
-        crate::maths::scalar::log10(self).floor() as i32
+/// A value of so many decimal figures: the nearest one, or the next one above (1) or below (-1), but for
+/// rounding. By way of text, as powers of ten of the largest and smallest numbers are none.
+fn rounded(value: f64, n_figures: usize, direction: i8) -> f64 {
+    let text = format!("{value:.*e}", n_figures - 1);
+    let Some((mantissa, exponent)) = text.split_once('e') else { return value };
+    let (Ok(mantissa), Ok(nearest)) = (mantissa.replace('.', "").parse::<i64>(), text.parse::<f64>()) else {
+        return value;
+    };
+    let slack = 1e-12 * value.abs();
+    let is_wrong = match direction {
+        1 => nearest < value - slack,
+        -1 => nearest > value + slack,
+        _ => false,
+    };
+    if nearest.is_infinite() {
+        return value;
     }
+    if !is_wrong {
+        return nearest;
+    }
+    let unit = exponent.parse::<i64>().unwrap_or(0) - (n_figures as i64 - 1);
+    // Below a power of ten lie finer steps: from 100 it is 99 and not 90.
+    let is_power = direction < 0 && mantissa == 10i64.pow(n_figures as u32 - 1);
+    let (mantissa, unit) = if is_power { (10 * mantissa, unit - 1) } else { (mantissa, unit) };
+    format!("{}e{unit}", mantissa + i64::from(direction)).parse().unwrap_or(value)
 }
 
 /// D_num = Σ η_i min(χ_i Δ²/24, Δ²/(12 Δt)) / Σ η_i over the zones that set the mean.
@@ -289,7 +272,11 @@ fn numerical_dispersion(
     for (idx, axis) in plan.axes.iter().enumerate() {
         let physical = dispersion(plan, idx);
         let numerical = bin_dispersion(plan, idx);
-        if axis.bins <= 1 || physical == 0.0 || numerical == 0.0 {
+        if axis.bins <= 1 || numerical == 0.0 {
+            continue;
+        }
+        if physical == 0.0 {
+            spreading(scenario, plan, idx, limits, diagnostics);
             continue;
         }
         let ratio = numerical / physical;
@@ -316,6 +303,52 @@ fn numerical_dispersion(
                 .help(enough_bins(plan, idx, ratio)),
         );
     }
+}
+
+/// Without dispersion there is nothing to compare the bins with but the domain. What moves relative to
+/// them is spread all the same; what rests in them is not.
+fn spreading(
+    scenario: &Scenario,
+    plan: &Plan,
+    axis_idx: usize,
+    limits: &mut Vec<Limit>,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    if plan.walk.drift[axis_idx] == 0.0 {
+        return;
+    }
+    let axis = &plan.axes[axis_idx];
+    let name = axis_name(axis.index);
+    let extent = axis.high - axis.low;
+    let spread = (2.0 * bin_dispersion(plan, axis_idx) * plan.time.duration).sqrt();
+    limits.push(Limit {
+        name: format!("spreading by the bins along {name}"),
+        formula: "sqrt(2 chi width^2 / 24 T) / extent",
+        value: spread / extent,
+        advice: "below 0.01; falls with the bin width",
+    });
+    if spread <= VISIBLE_SPREADING * extent {
+        return;
+    }
+    let needed = (axis.bins as f64 * spread / (VISIBLE_SPREADING * extent)).ceil();
+    let others = n_bins(plan) / axis.bins as f64;
+    let frame =
+        "let the frame move with the flow (`frame moving v`): what rests in its bins is not dispersed";
+    let bins = if needed * others > MAX_BINS {
+        String::new()
+    } else {
+        format!(
+            ", or use at least {needed} bins along {name}, and {} particles",
+            needed * others * FEW_PER_BIN
+        )
+    };
+    diagnostics.push(
+        Diagnostic::warning(N103, format!("the bins along {name} disperse, and the scene does not"))
+            .at(bins_span(scenario), format!("{} bins along {name}", axis.bins))
+            .found(format!("up to {} m of spreading in the run (standard deviation)", short(spread)))
+            .expected(format!("at most {} m, 1 % of the extent", short(VISIBLE_SPREADING * extent)))
+            .help(format!("{frame}{bins}")),
+    );
 }
 
 /// What brings the dispersion of the bins down to where it is not seen.
@@ -365,4 +398,20 @@ fn check_memory(
             .expected(format!("at most {:.2} GiB", gib(available)))
             .help(format!("at most {fitting} particles fit")),
     );
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn figures_are_rounded_the_way_that_is_safe_at_every_size() {
+        assert_eq!(
+            [1234.0, 0.0, 1.234e-305, 1.7e308, f64::MAX].map(short),
+            ["1230", "0", "1.23e-305", "1.7e308", "1.7977e308"]
+        );
+        assert_eq!([1.999e-300, 0.119, 7.0, 99.9].map(round_down), ["1.9e-300 s", "0.11 s", "7 s", "99 s"]);
+        assert_eq!([1231.0, 0.999_1, 5.0, 1e-9].map(short_up), ["1240", "1", "5", "1e-9"]);
+        assert_eq!([f64::INFINITY, f64::NAN].map(short), ["inf", "NaN"]);
+    }
 }

@@ -7,7 +7,7 @@ use super::{
     Quantity, Species, Stage, Time, Walk, Zone, ZoneRate,
 };
 use crate::diagnostic::Diagnostic;
-use crate::diagnostic::codes::D008;
+use crate::diagnostic::codes::{D008, M005};
 use crate::scenario::{self, Scenario};
 use crate::units::Dimension;
 
@@ -47,7 +47,25 @@ pub fn lower(scenario: &Scenario) -> Result<(Plan, Evaluation), Vec<Diagnostic>>
         seed: scenario.seed,
         axes,
     };
+    if !plan.walk.drift.iter().chain(&plan.walk.spread).copied().all(f64::is_finite) {
+        return Err(vec![unbounded_walk(scenario, &plan)]);
+    }
     Ok((plan, evaluation))
+}
+
+/// Numbers that can be written may have a difference or a product that is none.
+fn unbounded_walk(scenario: &Scenario, plan: &Plan) -> Diagnostic {
+    let is_drift = !plan.walk.drift.iter().copied().all(f64::is_finite);
+    let written = |span: Option<crate::source::Span>| span.unwrap_or(scenario.domain.span);
+    let (what, place) = if is_drift {
+        ("the velocity in the frame", written(scenario.flow.as_ref().map(|flow| flow.span)))
+    } else {
+        ("the dispersion", written(scenario.dispersion.as_ref().map(|tensor| tensor.span)))
+    };
+    Diagnostic::error(M005, format!("{what} is out of range"))
+        .at(place, "too large for a displacement")
+        .found("an infinite displacement")
+        .expected("a size that numbers can hold")
 }
 
 fn lower_axis(axis: &scenario::Axis, bins: usize) -> Axis {

@@ -8,6 +8,7 @@ mod check;
 pub mod compile;
 pub mod cost;
 pub mod document;
+mod edges;
 pub mod evaluation;
 pub mod explain;
 pub mod limits;
