@@ -235,13 +235,16 @@ fn build<'a>(
     let mixing = super::zones::mixing(checker, statements);
     let bins = super::geometry::bins(checker, statements);
     let particles = super::model::particles(checker, statements);
+    if let (Some(domain), Some(particles)) = (&domain, &particles) {
+        super::geometry::check_volume(checker, domain, particles);
+    }
     let run = super::model::run(checker, statements);
     let duration = run.as_ref().map(|run| run.duration);
     let (outputs, are_outputs_right) =
         super::observe::outputs(checker, statements, duration, bins.as_ref().and_then(Option::as_ref));
     let (references, are_references_right) = super::reference::references(checker, statements, &outputs);
     let (measures, are_measures_right) =
-        super::measure::measures(checker, statements, &outputs, &references, duration);
+        super::measure::measures(checker, statements, &outputs, &references, duration, domain.as_ref());
     let (sweeps, are_sweeps_right) = super::sweep::sweeps(checker, statements, &parameters, &measures);
     let (reports, are_reports_right) = match are_sweeps_right && !has_syntax_errors {
         true => super::sweep::reports(checker, statements, &measures, &sweeps),

@@ -4,7 +4,7 @@ use super::check::Checker;
 use super::choice::SIDES;
 use super::collect::Statements;
 use super::slot::tuple_parts;
-use super::{Axis, Domain, Side};
+use super::{Axis, Domain, Particles, Side};
 use crate::diagnostic::codes::{D009, M001, M002, M004, M006, M007, M008};
 use crate::diagnostic::{Diagnostic, precise};
 use crate::source::{Span, Spanned};
@@ -87,6 +87,9 @@ fn read_axis<'a>(
         return None;
     }
     let (low, high, _) = range?;
+    let extent = high.value - low.value;
+    let span = low.span.to(high.span);
+    checker.require(extent.is_normal(), &format!("the extent along {name}"), metres(extent), SIZE, span)?;
     Some(Axis {
         index: index?,
         low: low.value,
@@ -97,6 +100,29 @@ fn read_axis<'a>(
         high_side_span: axis.name.span,
         span: axis.name.span.to(high.span),
     })
+}
+
+const SIZE: &str = "a size that numbers can hold (2.3e-308 to 1.7e308)";
+
+fn metres(size: f64) -> String {
+    format!("{} m", precise(size))
+}
+
+/// Extents that numbers can hold may have a product that they cannot.
+pub(super) fn check_volume(checker: &mut Checker<'_>, domain: &Domain, particles: &Particles) {
+    let volume: f64 = domain.axes.iter().map(|axis| axis.high - axis.low).product();
+    let per_particle = volume / particles.count as f64;
+    let is_right = volume.is_normal() && per_particle.is_normal();
+    let Some((first, last)) = domain.axes.first().zip(domain.axes.last()) else { return };
+    let n_axes = domain.axes.len();
+    let unit = if n_axes == 1 { "m".to_owned() } else { format!("m^{n_axes}") };
+    let what =
+        if volume.is_normal() { "the size of the domain per particle" } else { "the size of the domain" };
+    let found = format!("{} {unit}", precise(if volume.is_normal() { per_particle } else { volume }));
+    // Axes stand in the order of x, y, z, not in that of the text.
+    let place = first.span.to(last.span);
+    let place = if first.span.start <= last.span.start { place } else { last.span.to(first.span) };
+    checker.require(is_right, what, found, SIZE, place);
 }
 
 /// The words for the two sides of an axis in a domain of given axes.

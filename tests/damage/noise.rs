@@ -104,7 +104,7 @@ impl Noise {
     /// The text of a number.
     pub fn text(&self, number: u64) -> String {
         let random = &mut Random(number.wrapping_mul(0xd134_2543_de82_ef95));
-        match random.below(16) {
+        match random.below(17) {
             0 => bytes(random),
             1 => characters(random),
             2 => self.soup(random),
@@ -114,6 +114,7 @@ impl Noise {
             6 => self.with_depth(random),
             7 => self.with_units(random),
             8 => self.with_numbers(random),
+            9 => of_extremes(random),
             _ => self.damaged(random),
         }
     }
@@ -240,6 +241,58 @@ impl Noise {
         }
         text
     }
+}
+
+/// Numbers that can be written, with sums, products, squares and quotients that cannot.
+const EXTREMES: &[&str] = &[
+    "0", "1", "-1", "2", "10", "0.3", "5e-324", "1e-323", "1e-310", "2.3e-308", "1e-300", "1e-160", "1e-155",
+    "1e-110", "1e-30", "1e30", "1e110", "1e155", "1e200", "1e300", "1e307", "1.7e308", "-1.7e308", "-1e-160",
+    "-1e155",
+];
+
+/// A sound scene, but for the size of its numbers: it reaches the plan and its limits.
+fn of_extremes(random: &mut Random) -> String {
+    let mut number = |often: &str| {
+        if random.below(3) == 0 { random.word(EXTREMES).to_owned() } else { often.to_owned() }
+    };
+    let mut axis = |name: &str| format!("{name} = {} m .. {} m", number("0"), number("7"));
+    let axes = [axis("x"), axis("y"), axis("z")];
+    let (flow, spread) = ([number("1"), number("0"), number("-2")], [number("0"), number("1"), number("3")]);
+    let numbers: Vec<String> = ["0.1", "2", "100", "6", "2", "5", "1"].into_iter().map(&mut number).collect();
+    let n_axes = 1 + random.below(3);
+    let shape = ["line", "rect", "box"][n_axes - 1];
+    let sides = [
+        &["left, right"][..],
+        &["left, right", "bottom, top"],
+        &["left, right", "front, back", "bottom, top"],
+    ];
+    let list = |values: &[String], unit: &str| {
+        let parts: Vec<String> = values[..n_axes].iter().map(|value| format!("{value} {unit}")).collect();
+        format!("({})", parts.join(", "))
+    };
+    let mut text = format!("lamella 1\nspecies A, B\ndomain {shape} {}", axes[..n_axes].join(", "));
+    if random.below(3) == 0 {
+        text += &format!(", frame moving {}", list(&flow, "m/s"));
+    }
+    for pair in sides[n_axes - 1] {
+        text += &format!("\nboundary {pair} {}", random.word(&["open", "reflect", "periodic"]));
+    }
+    let bins = ["4", "4 x 3", "4 x 3 x 2"][n_axes - 1];
+    text + &format!("\nflow uniform {}\ndispersion {}\n", list(&flow, "m/s"), list(&spread, "m^2/s"))
+        + &format!(
+            "average bins {bins}\nmixing zones {{ a: fraction 0.5, rate instant; b: fraction 0.5, rate {} /s }}\n",
+            numbers[0]
+        )
+        + &format!("initial A = {} mol/m^3 * exp(-x/({} m))\n", numbers[1], numbers[4])
+        + &format!(
+            "particles fluid {} stratified\nrun to {} s, step {} s\n",
+            numbers[2], numbers[3], numbers[6]
+        )
+        + &format!("output profile A at t = {} s on 3\noutput total A every {} s\n", numbers[3], numbers[6])
+        + &format!(
+            "measure m = l2(profile.A) over x = {} m .. {} m at t = {} s\n",
+            numbers[0], numbers[5], numbers[3]
+        )
 }
 
 fn bytes(random: &mut Random) -> String {
