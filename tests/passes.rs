@@ -25,11 +25,10 @@ fn small(text: &str) -> String {
 }
 
 fn compile(text: &str, passes: Selection) -> Compiled {
-    let checked = lamella::check(
-        Sources::single("scene.lam", text),
-        &Settings::default(),
-        &Options { passes, memory: None },
-    );
+    let mut sources = Sources::single("scene.lam", text);
+    // One of the scenes uses this one.
+    sources.add("used/column.lam", include_str!("scenes/used/column.lam"));
+    let checked = lamella::check(sources, &Settings::default(), &Options { passes, memory: None });
     checked.compiled.unwrap_or_else(|| panic!("no plan: {:#?}", checked.diagnostics))
 }
 
