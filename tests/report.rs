@@ -388,6 +388,8 @@ fn a_large_sweep_has_a_small_page() {
     assert!(page.html.len() < 5_000_000, "{} bytes", page.html.len());
     assert_balanced(&page.html);
     assert_eq!(csv(&page, "work_precision-err-wall_time.csv").len(), n_points as usize);
+    let replicates = csv(&page, "profile.csv").iter().map(|row| number(row, "n")).collect::<Vec<_>>();
+    assert_eq!(replicates, vec![2.0; 4 * N_BINS], "points of several row groups");
     let rows = csv(&page, "orders-err-particles.csv");
     assert_eq!(rows.len(), 31);
     let expected: Vec<f64> = (0..30).map(|k| 0.5 + f64::from(k)).collect();
