@@ -113,3 +113,23 @@ measure inverse  = mean(1 / g) * mean(g)
 ";
     assert_close(&measures_of(scene), &[0.5, 10.0, 2.0, 1.0]);
 }
+
+/// Where nothing is left, no norm is zero: an error of zero would read as perfect.
+#[test]
+fn a_norm_of_nothing_is_undefined() {
+    let norms = ["l1", "l2", "linf", "rmse", "integral", "mean", "minimum", "maximum"];
+    let lines = norms.map(|norm| format!("measure of_{norm} = {norm}(profile.T) over x = 0 m .. 4 m\n"));
+    let scene = "lamella 1
+species T
+domain line x = 0 m .. 10 m
+boundary left, right open
+flow uniform 1 m/d
+initial T = 1 mol/m^3
+particles fluid 1000 ordered
+run to 5 d, step 1 d
+output profile T at t = 5 d on 20
+";
+    let found = measures_of(&format!("{scene}{}", lines.concat()));
+    assert_eq!(found.len(), norms.len());
+    assert!(found.iter().all(|value| value.is_nan()), "{found:?}");
+}

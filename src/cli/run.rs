@@ -231,7 +231,7 @@ impl Job {
         watch.progress.finish();
         let outcome = outcome.map_err(|error| refusal.map_or_else(|| run_failed(&error), table_failed))?;
         let evaluated = measure::evaluate(plan, &self.compiled.evaluation, &snapshots, &outcome)
-            .map_err(|reason| Stopped::new(Exit::Failed, Diagnostic::error(codes::R105, reason)))?;
+            .map_err(measuring_failed)?;
         Ok(Found { outcome, snapshots, evaluated, started })
     }
 
@@ -264,6 +264,11 @@ impl Control for Watch<'_> {
 
 fn table_failed(error: TableError) -> Stopped {
     Stopped::new(Exit::Failed, Diagnostic::error(codes::F103, error.to_string()))
+}
+
+/// Checks refuse all of it that a scene shows; the run may still find more.
+fn measuring_failed(reason: String) -> Stopped {
+    Stopped::new(Exit::Failed, Diagnostic::error(codes::R105, reason))
 }
 
 fn run_failed(error: &RunError) -> Stopped {
@@ -304,6 +309,11 @@ mod tests {
         assert_eq!(of(RunError::OutOfMemory { bytes: 1 }), ("R103", Exit::Failed));
         assert_eq!(of(RunError::Plan("two".to_owned())), ("R104", Exit::Failed));
         assert_eq!(of(RunError::Sink("full".to_owned())), ("F103", Exit::Failed));
+        let kind = lamella::plan::OutputKind::Total;
+        let overflow = RunError::NonFiniteOutput { t: 1.0, kind, quantity: "A".to_owned() };
+        assert_eq!(of(overflow), ("R102", Exit::Failed));
+        let stopped = measuring_failed("The measure `m` has no value.".to_owned());
+        assert_eq!((stopped.message.code.0, stopped.exit), ("R105", Exit::Failed));
     }
 
     #[test]

@@ -6,8 +6,9 @@ use super::expression::Type;
 use super::model::species_index;
 use super::observe::{OUTPUTS, time_list};
 use super::places::{Places, Results, place_of};
+use super::restriction::check_restrictions;
 use super::scope::THE_REFERENCE;
-use super::{Measure, Output, OutputKind, Reference};
+use super::{Domain, Measure, Output, OutputKind, Reference};
 use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{D004, D007, M015, U101, U103, U108};
 use crate::maths::operator::{Binary, Unary};
@@ -119,13 +120,14 @@ pub(super) fn measures<'a>(
     outputs: &[Output],
     references: &[Reference],
     duration: Option<f64>,
+    domain: Option<&Domain>,
 ) -> (Vec<Measure>, bool) {
     let are_whole =
         outputs.len() == statements.outputs.len() && references.len() == statements.references.len();
     let mut list = Vec::new();
     for (span, written) in &statements.measures {
         let results = Results { outputs, references, are_whole, times: None, decided: Vec::new() };
-        list.extend(measure(checker, results, *span, written, duration));
+        list.extend(measure(checker, results, *span, written, duration, domain));
     }
     let is_right = list.len() == statements.measures.len();
     (list, is_right)
@@ -137,6 +139,7 @@ fn measure<'a>(
     span: Span,
     written: &'a tree::Measure,
     duration: Option<f64>,
+    domain: Option<&Domain>,
 ) -> Option<Measure> {
     let times = match &written.times {
         None => Some(None),
@@ -161,11 +164,13 @@ fn measure<'a>(
             return None;
         }
     };
+    let over = over?;
+    check_restrictions(checker, &results, written, &value, over, domain)?;
     Some(Measure {
         name: written.name.value.clone(),
         span,
         value,
-        over: over?,
+        over,
         times: times?,
         dimension,
         doc: written.doc.as_ref().map(|doc| doc.value.clone()),

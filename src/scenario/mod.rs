@@ -18,6 +18,7 @@ mod point;
 mod quantity;
 mod reactions;
 mod reference;
+mod restriction;
 mod scope;
 mod settings;
 mod slot;

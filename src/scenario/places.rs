@@ -71,7 +71,7 @@ impl Places {
         let all = self.candidates();
         let keep = |list: &[usize], test: &dyn Fn(usize) -> bool| -> Vec<usize> {
             let kept: Vec<usize> = list.iter().copied().filter(|&idx| test(idx)).collect();
-            // What fits nowhere is told by others: it decides nothing here.
+            // What fits nowhere is told by `restriction`: it decides nothing here.
             if kept.is_empty() { list.to_vec() } else { kept }
         };
         let in_time = keep(&all, &|idx| has_times(&results.outputs[idx], results.times.as_deref()));
@@ -86,7 +86,7 @@ fn common(a: &Option<Vec<usize>>, b: &Option<Vec<usize>>) -> Option<Vec<usize>> 
     }
 }
 
-fn has_times(output: &Output, wanted: Option<&[f64]>) -> bool {
+pub(super) fn has_times(output: &Output, wanted: Option<&[f64]>) -> bool {
     let is_there =
         |&t: &f64| output.times.iter().any(|own| (own - t).abs() <= SAME_TIME * t.abs().max(own.abs()));
     wanted.is_none_or(|times| times.iter().all(is_there))

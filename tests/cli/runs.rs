@@ -180,10 +180,10 @@ fn an_interrupted_run_leaves_no_half_file_and_exits_130() {
 }
 
 #[test]
-fn a_measure_without_its_time_writes_nothing() {
+fn a_measure_without_its_time_is_refused_before_the_run() {
     let folder = Folder::new();
     folder.write("small.lam", format!("{SMALL}measure late = integral(profile.AB) at t = 75 s\n"));
-    run(&folder, &[]).exits(1).says("error[R105]");
+    run(&folder, &[]).exits(2).says("error[M015]");
     assert!(!folder.files().iter().any(|name| name.ends_with(".parquet")), "{:?}", folder.files());
 }
 
