@@ -36,7 +36,7 @@ bless: cargo ## Accept the present output of all snapshot tests; look at the dif
 	INSTA_UPDATE=always LAMELLA_BLESS=1 $(CARGO) test --release
 
 soak: cargo ## Run the experiments in full and feed a million damaged scenes to the checker (takes many minutes)
-	LAMELLA_SOAK=1 $(CARGO) test --release --test experiments -- --nocapture --test-threads 1
+	LAMELLA_SOAK=1 $(CARGO) test --release --test experiments --test error_bars -- --nocapture --test-threads 1
 	$(CARGO) run --release --example fuzz_check -- 1000000
 
 clean: ## Remove what was built; results stay

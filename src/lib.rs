@@ -5,6 +5,7 @@
 pub mod catalog;
 pub mod diagnostic;
 pub mod engine;
+pub mod estimate;
 pub mod maths;
 pub mod measure;
 pub mod plan;

@@ -15,6 +15,7 @@ const LAYERS: &[&[&str]] = &[
     &["table"],
     &["measure"],
     &["report"],
+    &["estimate"],
     &["sweep"],
 ];
 

@@ -383,3 +383,51 @@ fn every_unit_is_told_as_exponents_too() {
     assert_eq!(of("errors", "rmse", Some("A, B")), [("mol/m^3", [-3.0, 0.0, 0.0, 1.0])]);
     assert_eq!(of("errors", "relative_l1", None), [("1", [0.0; 4])]);
 }
+
+#[test]
+fn error_bars_are_a_table_with_units() {
+    let folder = tempfile::tempdir().unwrap();
+    let bar = lamella::table::ErrorBarRow {
+        point: 0,
+        replicate: 0,
+        t: None,
+        output: 0,
+        kind: "profile".to_owned(),
+        species_a: "A".to_owned(),
+        species_b: None,
+        n: 5,
+        size: 4.0,
+        total: 0.5,
+        from_step: 0.25,
+        from_particles: 0.125,
+        from_bins: None,
+        relative: Some(0.125),
+        unit: "mol/m^3".to_owned(),
+    };
+    let mut writer = Writer::create(folder.path(), &common::plan(), &common::record()).unwrap();
+    writer.error_bars(vec![bar]);
+    writer.finish(vec![common::point()], &[]).unwrap();
+    let path = folder.path().join("error_bars/part-0000.parquet");
+    assert_eq!(read::footer(&path).unwrap().table, "error_bars");
+    let file = std::fs::File::open(&path).unwrap();
+    let mut batches = parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder::try_new(file)
+        .unwrap()
+        .build()
+        .unwrap();
+    let batch = batches.next().unwrap().unwrap();
+    let number = |name: &str| {
+        let column = batch.column_by_name(name).unwrap().as_primitive::<Float64Type>();
+        column.is_valid(0).then(|| column.value(0))
+    };
+    let names = ["t", "size", "total", "from_step", "from_particles", "from_bins", "relative"];
+    let expected = [None, Some(4.0), Some(0.5), Some(0.25), Some(0.125), None, Some(0.125)];
+    assert_eq!(names.map(number), expected);
+    let meanings = meanings(folder.path());
+    let told = |(texts, exponents): &&Meaning| {
+        let [table, column, species, unit] = texts.each_ref().map(|text| text.as_deref());
+        (table, column, species) == (Some("error_bars"), Some("total"), Some("A"))
+            && unit == Some("mol/m^2.5")
+            && exponents.map(Option::unwrap) == [-2.5, 0.0, 0.0, 1.0]
+    };
+    assert_eq!(meanings.iter().filter(told).count(), 1);
+}

@@ -5,6 +5,7 @@
 
 mod check;
 mod completions;
+mod error_bars;
 mod explain;
 mod files;
 mod fmt;

@@ -1,5 +1,6 @@
 //! `lamella run`: a scene, all the way to tables, errors and a figure.
 
+use super::error_bars::ErrorBars;
 use super::files::{is_stdin, write_whole};
 use super::interrupt::Interrupt;
 use super::load;
@@ -37,6 +38,9 @@ pub(crate) struct Arguments {
     /// Threads; the results are the same for any number [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
+    /// Find an error bar for each output, without a reference; takes up to five times the time
+    #[arg(long)]
+    error: bool,
     /// Draw figure.svg in the folder of the results
     #[arg(long)]
     plot: bool,
@@ -80,6 +84,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
         folder: arguments.folder(),
         n_threads: arguments.n_threads(),
         wants_figure: arguments.plot,
+        wants_error_bars: arguments.error,
         begin,
     };
     run_checked(checked, asked, terminal)
@@ -98,7 +103,8 @@ pub(crate) fn run_sources(
     let options = Options { memory: machine::available_memory(), ..Options::default() };
     let checked = lamella::check(sources, settings, &options);
     let folder = folder.to_path_buf();
-    let asked = Asked { name: name.to_owned(), folder, n_threads, wants_figure: true, begin };
+    let name = name.to_owned();
+    let asked = Asked { name, folder, n_threads, wants_figure: true, wants_error_bars: false, begin };
     run_checked(checked, asked, terminal)
 }
 
@@ -108,6 +114,7 @@ struct Asked {
     folder: PathBuf,
     n_threads: usize,
     wants_figure: bool,
+    wants_error_bars: bool,
     begin: Instant,
 }
 
@@ -128,6 +135,7 @@ fn run_checked(mut checked: Checked, asked: Asked, terminal: &Terminal) -> Comma
         folder: asked.folder,
         n_threads: asked.n_threads,
         wants_figure: asked.wants_figure,
+        wants_error_bars: asked.wants_error_bars,
         compile_wall,
         compiled,
     };
@@ -154,6 +162,7 @@ struct Job {
     folder: PathBuf,
     n_threads: usize,
     wants_figure: bool,
+    wants_error_bars: bool,
     compile_wall: f64,
 }
 
@@ -162,6 +171,7 @@ struct Found {
     outcome: Outcome,
     snapshots: Vec<Snapshot>,
     evaluated: Evaluated,
+    error_bars: Option<ErrorBars>,
     started: i64,
 }
 
@@ -170,6 +180,7 @@ impl Job {
         let mut writer =
             Writer::create(&self.folder, &self.compiled.plan, &self.record).map_err(table_failed)?;
         let found = self.simulate(&mut writer, terminal, interrupt)?;
+        writer.error_bars(found.error_bars.as_ref().map(|bars| bars.rows.clone()).unwrap_or_default());
         let begin = Instant::now();
         let figure = self.wants_figure.then(|| {
             report::figure(&self.compiled.plan, &self.record, &found.snapshots, &found.evaluated.curves)
@@ -191,6 +202,7 @@ impl Job {
             outcome: &found.outcome,
             errors: &errors,
             measures: &measures,
+            error_bars: found.error_bars.as_ref(),
             n_threads: self.n_threads,
             peak_memory: machine::peak_memory(),
             compile_wall: self.compile_wall,
@@ -232,7 +244,12 @@ impl Job {
         let outcome = outcome.map_err(|error| refusal.map_or_else(|| run_failed(&error), table_failed))?;
         let evaluated = measure::evaluate(plan, &self.compiled.evaluation, &snapshots, &outcome)
             .map_err(measuring_failed)?;
-        Ok(Found { outcome, snapshots, evaluated, started })
+        let find_bars = || {
+            let (n_axes, followed) = (self.record.n_axes, (terminal, &watch));
+            ErrorBars::find(plan, n_axes, &snapshots, self.n_threads, followed)
+        };
+        let error_bars = self.wants_error_bars.then(find_bars).transpose()?;
+        Ok(Found { outcome, snapshots, evaluated, error_bars, started })
     }
 
     fn point(&self, found: &Found) -> lamella::table::PointRow {
@@ -247,9 +264,9 @@ impl Job {
 }
 
 /// What the engine is watched by.
-struct Watch<'a> {
-    progress: Progress<'a>,
-    interrupt: &'a Interrupt,
+pub(super) struct Watch<'a> {
+    pub(super) progress: Progress<'a>,
+    pub(super) interrupt: &'a Interrupt,
 }
 
 impl Control for Watch<'_> {
@@ -271,7 +288,7 @@ fn measuring_failed(reason: String) -> Stopped {
     Stopped::new(Exit::Failed, Diagnostic::error(codes::R105, reason))
 }
 
-fn run_failed(error: &RunError) -> Stopped {
+pub(super) fn run_failed(error: &RunError) -> Stopped {
     let (exit, code) = match error {
         RunError::Cancelled => (Exit::Interrupted, codes::R101),
         RunError::NonFiniteInitial { .. }

@@ -1,5 +1,6 @@
 //! What a run tells at its end: errors against references, measures, time, mass, where the results are.
 
+use super::error_bars::{ErrorBars, JsonBar};
 use super::text::{Align, bytes, duration, grouped, significant, table};
 use lamella::engine::snapshot::Outcome;
 use lamella::table::{ErrorRow, Value};
@@ -17,6 +18,7 @@ pub(crate) struct Summary<'a> {
     pub(crate) outcome: &'a Outcome,
     pub(crate) errors: &'a [ErrorRow],
     pub(crate) measures: &'a [Value],
+    pub(crate) error_bars: Option<&'a ErrorBars>,
     pub(crate) n_threads: usize,
     pub(crate) peak_memory: Option<u64>,
     /// Wall seconds of reading and planning, and of writing tables and figure.
@@ -26,7 +28,8 @@ pub(crate) struct Summary<'a> {
 
 impl Summary<'_> {
     pub(crate) fn text(&self) -> String {
-        let parts = [self.error_table(), self.measure_table(), self.facts()];
+        let bars = self.error_bars.map(ErrorBars::text).unwrap_or_default();
+        let parts = [self.error_table(), bars, self.measure_table(), self.facts()];
         let present: Vec<String> = parts.into_iter().filter(|part| !part.is_empty()).collect();
         present.join("\n")
     }
@@ -127,6 +130,7 @@ impl Summary<'_> {
             peak_memory: self.peak_memory,
             errors: self.errors.iter().map(JsonError::new).collect(),
             measures: self.measures.iter().map(JsonMeasure::new).collect(),
+            error_bars: self.error_bars.map(ErrorBars::json),
         };
         serde_json::to_string(&summary).expect("strings and numbers serialise") + "\n"
     }
@@ -184,6 +188,9 @@ struct JsonSummary<'a> {
     peak_memory: Option<u64>,
     errors: Vec<JsonError<'a>>,
     measures: Vec<JsonMeasure<'a>>,
+    /// Only if they were asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    error_bars: Option<Vec<JsonBar<'a>>>,
 }
 
 /// Norms and noise relative to the reference; null where that is zero.
@@ -278,6 +285,7 @@ mod tests {
             outcome,
             errors,
             measures,
+            error_bars: None,
             n_threads: 2,
             peak_memory: Some(40_000_000),
             compile_wall: 0.01,

@@ -3,13 +3,17 @@
 //! Owns the settings and the line to the caller. May use nothing else of the crate. It deliberately
 //! prints nothing.
 
-/// What does not change a byte of the results.
+/// How a plan is run: threads and vector instructions change no byte of the results, half draws do.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Settings {
     /// Threads of a pool of its own; `None` takes the pool of the caller.
     pub threads: Option<usize>,
     /// Never use vector instructions beyond the baseline, to compare.
     pub is_narrow: bool,
+    /// The noise of a step is the sum of two draws, those of the two half steps in a run of the same
+    /// plan with half the step and without this: both runs then follow the same paths, and differ by
+    /// what the step does to them alone.
+    pub takes_half_draws: bool,
 }
 
 /// Progress and Ctrl-C, asked once per step.

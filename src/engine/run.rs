@@ -103,7 +103,8 @@ pub fn run<const D: usize>(
 
 impl<'a, const D: usize> Run<'a, D> {
     fn new(plan: &'a Plan, settings: &Settings) -> Result<Self, RunError> {
-        let program = Program::<D>::new(plan)?;
+        let mut program = Program::<D>::new(plan)?;
+        program.mover.takes_half_draws = settings.takes_half_draws;
         let blocks = initial::blocks(&program)?;
         let before = amount::amounts(&blocks, program.n_columns());
         let limits = limits(&program, &before);

@@ -27,6 +27,8 @@ pub struct Mover<const D: usize> {
     /// Lower triangle of B.
     spread: [[f64; D]; D],
     normals: Normals,
+    /// Whether a draw is the normalised sum of two, those of half steps.
+    pub takes_half_draws: bool,
 }
 
 impl<const D: usize> Mover<D> {
@@ -40,7 +42,8 @@ impl<const D: usize> Mover<D> {
         for row in 0..D {
             spread[row][..=row].copy_from_slice(&walk.spread[row * (row + 1) / 2..][..=row]);
         }
-        Some(Self { drift: std::array::from_fn(|axis| walk.drift[axis]), spread, normals: walk.normals })
+        let drift = std::array::from_fn(|axis| walk.drift[axis]);
+        Some(Self { drift, spread, normals: walk.normals, takes_half_draws: false })
     }
 
     /// Whether anything moves.
@@ -57,6 +60,20 @@ impl<const D: usize> Mover<D> {
     /// Draws the noise of one chunk for the axes that have any. The place of a draw follows from block,
     /// chunk and step alone.
     pub fn draw(&self, width: Width, stream: &Stream, place: Place, noise: &mut Noise<D>) {
+        if self.takes_half_draws {
+            let mut second = [[0.0; CHUNK]; D];
+            self.draw_once(width, stream, Place { step: 2 * place.step, ..place }, noise);
+            self.draw_once(width, stream, Place { step: 2 * place.step + 1, ..place }, &mut second);
+            for (first, second) in noise.iter_mut().flatten().zip(second.iter().flatten()) {
+                *first = std::f64::consts::FRAC_1_SQRT_2 * (*first + second);
+            }
+            return;
+        }
+        self.draw_once(width, stream, place, noise);
+    }
+
+    /// The noise of one draw, whatever draws a step takes.
+    pub fn draw_once(&self, width: Width, stream: &Stream, place: Place, noise: &mut Noise<D>) {
         let first = (place.step * CHUNKS_PER_BLOCK as u64 + place.chunk_idx) * D as u64;
         for (axis, noise) in noise.iter_mut().enumerate() {
             let number = first + axis as u64;

@@ -82,6 +82,38 @@ pub struct MeasureValue {
     pub value: f64,
 }
 
+/// What a run found for one quantity of one output, in SI units.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Fields {
+    /// Length, area or volume that a sum over bins is weighted with in a norm.
+    pub weight: f64,
+    pub times: Vec<FieldAt>,
+}
+
+/// Values at one time over the bins of an output, one value for a total or a γ.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FieldAt {
+    /// s
+    pub t: f64,
+    pub values: Vec<f64>,
+    /// False for a bin that no particle was in.
+    pub is_filled: Vec<bool>,
+}
+
+/// The values of a quantity of an output, as references are compared with them.
+pub fn fields(
+    plan: &Plan,
+    snapshots: &[Snapshot],
+    output_idx: usize,
+    quantity: Quantity,
+) -> Result<Fields, String> {
+    let series = observed::series(plan, snapshots, output_idx, quantity)?;
+    let times = series.times.into_iter();
+    let field =
+        |time: observed::Observed| FieldAt { t: time.t, values: time.values, is_filled: time.is_filled };
+    Ok(Fields { weight: series.grid.weight, times: times.map(field).collect() })
+}
+
 /// Compares the snapshots of a finished run with all references and computes all measures.
 ///
 /// An error is one sentence: a reference that cannot be built, or fields that do not fit together.

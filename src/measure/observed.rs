@@ -47,17 +47,26 @@ impl Run<'_> {
 
     /// The values of a quantity at all times of an output.
     pub(super) fn series(&self, output_idx: usize, quantity: Quantity) -> Result<Series, String> {
-        let output = self.output(output_idx);
-        let column = column(output, quantity).ok_or("the output lacks that species or pair.")?;
-        let grid = Grid::of(self.plan, output)?;
-        let times = self
-            .snapshots
-            .iter()
-            .filter(|snapshot| snapshot.output_idx == output_idx)
-            .map(|snapshot| observed(snapshot, column, grid.n_bins()))
-            .collect::<Result<Vec<_>, _>>()?;
-        Ok(Series { output_idx, grid, times })
+        series(self.plan, self.snapshots, output_idx, quantity)
     }
+}
+
+/// The values of a quantity at all times of an output.
+pub(super) fn series(
+    plan: &Plan,
+    snapshots: &[Snapshot],
+    output_idx: usize,
+    quantity: Quantity,
+) -> Result<Series, String> {
+    let output = &plan.outputs[output_idx];
+    let column = column(output, quantity).ok_or("the output lacks that species or pair.")?;
+    let grid = Grid::of(plan, output)?;
+    let times = snapshots
+        .iter()
+        .filter(|snapshot| snapshot.output_idx == output_idx)
+        .map(|snapshot| observed(snapshot, column, grid.n_bins()))
+        .collect::<Result<Vec<_>, _>>()?;
+    Ok(Series { output_idx, grid, times })
 }
 
 /// Where a quantity stands among those of an output; a pair is the same in either order.

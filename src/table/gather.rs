@@ -122,8 +122,8 @@ impl Gatherer {
             done.push((part_name(Kind::Errors), sheet.finish()?));
         }
         tables.push(("points".to_owned(), points::table(&self.shape, &[]).0));
-        let (meanings, arrays) =
-            lists::columns(&tables, &self.sample, &self.writer.plan, &self.writer.record);
+        let compared: Vec<lists::Compared> = self.sample.iter().map(lists::Compared::from).collect();
+        let (meanings, arrays) = lists::columns(&tables, &compared, &self.writer.plan, &self.writer.record);
         let columns = self.writer.whole("columns.parquet", "columns", &meanings, arrays)?;
         done.push(("columns.parquet".to_owned(), columns));
         if let Some(sheet) = self.points.take() {

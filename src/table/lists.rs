@@ -1,10 +1,10 @@
-//! The two small tables beside the data: errors against references, and what columns mean.
+//! The small tables beside the data: errors against references, error bars, and what columns mean.
 //!
 //! Owns their rows in Arrow's shape. May use `record`, `schema`, `unit`. It deliberately computes
 //! no error.
 
 use super::footer::{doc_of, names};
-use super::record::{ErrorRow, Norms, Record};
+use super::record::{ErrorBarRow, ErrorRow, Norms, Record};
 use super::schema::{Column, Kind, Measured};
 use super::unit::{ValueUnit, dimension_of, exponent, integrated, si_text, value_unit};
 use crate::plan::Plan;
@@ -49,6 +49,63 @@ pub fn errors(rows: &[ErrorRow]) -> Vec<ArrayRef> {
     ]
 }
 
+/// Columns of the table of error bars, in the order of its schema.
+pub fn error_bars(rows: &[ErrorBarRow]) -> Vec<ArrayRef> {
+    let norm = |of: fn(&ErrorBarRow) -> Option<f64>| -> ArrayRef {
+        let finite = |row: &ErrorBarRow| of(row).filter(|value| value.is_finite());
+        Arc::new(rows.iter().map(finite).collect::<Float64Array>())
+    };
+    vec![
+        Arc::new(UInt32Array::from_iter_values(rows.iter().map(|row| row.point))),
+        Arc::new(UInt32Array::from_iter_values(rows.iter().map(|row| row.replicate))),
+        Arc::new(rows.iter().map(|row| row.t).collect::<Float64Array>()),
+        Arc::new(UInt16Array::from_iter_values(rows.iter().map(|row| row.output))),
+        words(rows.iter().map(|row| Some(row.kind.as_str()))),
+        words(rows.iter().map(|row| Some(row.species_a.as_str()))),
+        words(rows.iter().map(|row| row.species_b.as_deref())),
+        words(rows.iter().map(|_| Some("l2"))),
+        Arc::new(UInt64Array::from_iter_values(rows.iter().map(|row| row.n))),
+        norm(|row| Some(row.size)),
+        norm(|row| Some(row.total)),
+        norm(|row| Some(row.from_step)),
+        norm(|row| Some(row.from_particles)),
+        norm(|row| row.from_bins),
+        norm(|row| row.relative),
+        words(rows.iter().map(|row| Some(row.unit.as_str()))),
+    ]
+}
+
+/// What the rows of a table of norms are of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Compared {
+    table: Kind,
+    /// Species, or pair as `A, B`.
+    species: String,
+    kind: String,
+    output: u16,
+    unit: String,
+}
+
+impl From<&ErrorRow> for Compared {
+    fn from(row: &ErrorRow) -> Self {
+        let species = species_or_pair(&row.species_a, row.species_b.as_deref());
+        let (kind, unit) = (row.kind.clone(), row.unit.clone());
+        Self { table: Kind::Errors, species, kind, output: row.output, unit }
+    }
+}
+
+impl From<&ErrorBarRow> for Compared {
+    fn from(row: &ErrorBarRow) -> Self {
+        let species = species_or_pair(&row.species_a, row.species_b.as_deref());
+        let (kind, unit) = (row.kind.clone(), row.unit.clone());
+        Self { table: Kind::ErrorBars, species, kind, output: row.output, unit }
+    }
+}
+
+fn species_or_pair(a: &str, b: Option<&str>) -> String {
+    b.map_or_else(|| a.to_owned(), |b| format!("{a}, {b}"))
+}
+
 fn words<'a>(texts: impl Iterator<Item = Option<&'a str>>) -> ArrayRef {
     let mut builder = StringDictionaryBuilder::<UInt16Type>::new();
     texts.for_each(|text| builder.append_option(text));
@@ -69,14 +126,14 @@ struct Meaning {
 /// unit and the scene's text for it; for errors a row per kind of table and species that was compared.
 pub fn columns(
     tables: &[(String, Vec<Column>)],
-    errors: &[ErrorRow],
+    compared: &[Compared],
     plan: &Plan,
     record: &Record,
 ) -> (Vec<Column>, Vec<ArrayRef>) {
     let rows: Vec<Meaning> = tables
         .iter()
         .flat_map(|(table, columns)| columns.iter().map(move |column| (table, column)))
-        .flat_map(|(table, column)| meanings(table, column, errors, plan, record))
+        .flat_map(|(table, column)| meanings(table, column, compared, plan, record))
         .collect();
     (column_columns(), column_arrays(&rows))
 }
@@ -118,7 +175,13 @@ fn column_arrays(rows: &[Meaning]) -> Vec<ArrayRef> {
     arrays
 }
 
-fn meanings(table: &str, column: &Column, errors: &[ErrorRow], plan: &Plan, record: &Record) -> Vec<Meaning> {
+fn meanings(
+    table: &str,
+    column: &Column,
+    compared: &[Compared],
+    plan: &Plan,
+    record: &Record,
+) -> Vec<Meaning> {
     let row = |species, unit, dimension, description: &str| Meaning {
         table: table.to_owned(),
         column: column.name.clone(),
@@ -139,30 +202,32 @@ fn meanings(table: &str, column: &Column, errors: &[ErrorRow], plan: &Plan, reco
                 let description = if docs.is_empty() { &column.doc } else { &docs };
                 rows.push(row(Some(species), Some(unit.text), Some(unit.dimension), description));
             }
-            if table == Kind::Errors.name() {
-                for (species, kind, dimension) in compared(&column.name, errors, plan) {
-                    let description = format!("{}; of {kind}", column.doc);
-                    rows.push(row(Some(species), Some(si_text(dimension)), Some(dimension), &description));
-                }
+            for (species, kind, dimension) in norms_of(table, &column.name, compared, plan) {
+                let description = format!("{}; of {kind}", column.doc);
+                rows.push(row(Some(species), Some(si_text(dimension)), Some(dimension), &description));
             }
             rows
         }
     }
 }
 
-/// What an error column is measured in: species or pair, kind of table and dimension, each once.
-fn compared(column: &str, errors: &[ErrorRow], plan: &Plan) -> Vec<(String, String, Dimension)> {
+/// What a column of norms is measured in: species or pair, kind of table and dimension, each once.
+fn norms_of(
+    table: &str,
+    column: &str,
+    compared: &[Compared],
+    plan: &Plan,
+) -> Vec<(String, String, Dimension)> {
     let mut found = Vec::new();
-    for row in errors {
+    for row in compared.iter().filter(|row| row.table.name() == table) {
         let Some(field) = dimension_of(&row.unit) else { continue };
         let Some(output) = plan.outputs.get(usize::from(row.output)) else { continue };
         let dimension = match column {
             "l1" => integrated(plan, output.kind, field, 1),
-            "l2" | "noise" => integrated(plan, output.kind, field, 2),
-            _ => field,
+            "linf" | "rmse" => field,
+            _ => integrated(plan, output.kind, field, 2),
         };
-        let second = row.species_b.as_ref().map(|name| format!(", {name}")).unwrap_or_default();
-        let entry = (format!("{}{second}", row.species_a), row.kind.clone(), dimension);
+        let entry = (row.species.clone(), row.kind.clone(), dimension);
         if !found.contains(&entry) {
             found.push(entry);
         }

@@ -25,7 +25,9 @@ pub use footer::{Footer, KEY as FOOTER_KEY, Parameter as FooterParameter, VERSIO
 pub use gather::Gatherer;
 pub use points::{Shape, is_fixed as is_fixed_column};
 pub use read::is_complete;
-pub use record::{ErrorRow, Norms, Parameter, PointRow, Record, Status, Swept, SweptValue, Value};
+pub use record::{
+    ErrorBarRow, ErrorRow, Norms, Parameter, PointRow, Record, Status, Swept, SweptValue, Value,
+};
 pub use schema::Kind;
 pub use unit::{ValueUnit, integrated, si_text, value_dimension, value_unit};
 pub use writer::{Summary, Writer, WrittenFile};

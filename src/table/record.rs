@@ -160,3 +160,30 @@ pub struct Norms {
     pub linf: f64,
     pub rmse: f64,
 }
+
+/// The expected error of one quantity of one output, at one time or over all, in the norm L2.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ErrorBarRow {
+    pub point: u32,
+    pub replicate: u32,
+    /// Seconds; `None` is all times of the output together.
+    pub t: Option<f64>,
+    /// Index into the plan's outputs.
+    pub output: u16,
+    /// `profile`, `map`, `covariance`, `total` or `mixing`.
+    pub kind: String,
+    pub species_a: String,
+    /// The second of a pair.
+    pub species_b: Option<String>,
+    /// Values that it is estimated from.
+    pub n: u64,
+    /// SI; `unit` is that of the field. The result's own norm, then that of its error and of its parts.
+    pub size: f64,
+    pub total: f64,
+    pub from_step: f64,
+    pub from_particles: f64,
+    pub from_bins: Option<f64>,
+    /// `None` where the result is zero.
+    pub relative: Option<f64>,
+    pub unit: String,
+}

@@ -19,10 +19,11 @@ pub enum Kind {
     Mixing,
     Particles,
     Errors,
+    ErrorBars,
 }
 
 impl Kind {
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Profile,
         Self::Map,
         Self::Covariance,
@@ -30,6 +31,7 @@ impl Kind {
         Self::Mixing,
         Self::Particles,
         Self::Errors,
+        Self::ErrorBars,
     ];
 
     /// Name of the folder.
@@ -42,6 +44,7 @@ impl Kind {
             Self::Mixing => "mixing",
             Self::Particles => "particles",
             Self::Errors => "errors",
+            Self::ErrorBars => "error_bars",
         }
     }
 }
@@ -157,6 +160,7 @@ pub fn columns(kind: Kind) -> Vec<Column> {
             columns.push(concentration("concentration of the particle"));
         }
         Kind::Errors => return error_columns(),
+        Kind::ErrorBars => return error_bar_columns(),
     }
     columns.push(plain("unit", word(), "unit of the values of this row"));
     columns.push(plain("output", DataType::UInt16, "number of the output in the plan, from 0"));
@@ -191,6 +195,38 @@ fn error_columns() -> Vec<Column> {
         ratio("relative_rmse", "rmse / root mean square of the reference"),
         norm("noise", "l2 that sampling noise alone would give: unit times m^(1/2) per axis"),
         plain("unit", word(), "SI unit of the compared values"),
+    ]
+}
+
+fn error_bar_columns() -> Vec<Column> {
+    let norm = |name: &str, doc: &str| Column::new(name, DataType::Float64, Measured::Row, doc).or_null();
+    let [point, replicate, t] = head();
+    let t = Column { doc: "time; null is all times of the output together".to_owned(), ..t.or_null() };
+    vec![
+        point,
+        replicate,
+        t,
+        plain("output", DataType::UInt16, "number of the output in the plan, from 0"),
+        plain("kind", word(), "table of the values"),
+        plain("species_a", word(), "species, or the first of a pair"),
+        plain("species_b", word(), "the second species of a pair").or_null(),
+        plain("norm", word(), "norm of the other columns: l2, over bins or times, as in table errors"),
+        plain(
+            "n",
+            DataType::UInt64,
+            "values that the bar is estimated from: bins that no trial left empty, times",
+        ),
+        norm("size", "norm of the result"),
+        norm("total", "expected norm of result - truth"),
+        norm("from_step", "the part that falls in proportion to the step"),
+        norm("from_particles", "sampling noise, and the bias of few particles per bin"),
+        norm(
+            "from_bins",
+            "the part that falls with the square of the width of bins; null if it was not tried",
+        ),
+        Column::new("relative", DataType::Float64, Measured::Fixed(Dimension::NONE), "total / size")
+            .or_null(),
+        plain("unit", word(), "SI unit of the values; the norm is in unit times m^(1/2) per axis"),
     ]
 }
 

@@ -6,7 +6,7 @@
 use super::failure::TableError;
 use super::footer::Footer;
 use super::points::Shape;
-use super::record::{ErrorRow, PointRow, Record};
+use super::record::{ErrorBarRow, ErrorRow, PointRow, Record};
 use super::rows::{self, Layout, Place};
 use super::schema::{self, Column, Kind};
 use super::sheet::{Draft, Finished, Sheet, is_temporary, sync_folder};
@@ -27,6 +27,7 @@ pub struct Writer {
     pub(super) plan: Plan,
     pub(super) record: Record,
     pub(super) sheets: Vec<(Kind, Layout, Sheet)>,
+    error_bars: Vec<ErrorBarRow>,
     elapsed: Duration,
 }
 
@@ -62,6 +63,7 @@ impl Writer {
             plan: plan.clone(),
             record: record.clone(),
             sheets: Vec::new(),
+            error_bars: Vec::new(),
             elapsed: Duration::ZERO,
         };
         for kind in Kind::ALL {
@@ -93,6 +95,11 @@ impl Writer {
         Ok(())
     }
 
+    /// Takes the rows of the table of error bars, which is written at the end.
+    pub fn error_bars(&mut self, rows: Vec<ErrorBarRow>) {
+        self.error_bars = rows;
+    }
+
     /// Completes every file, then gives all of them their names; `points.parquet` comes last, so
     /// that a folder whose points tell of a plan holds the whole of it.
     pub fn finish(mut self, mut points: Vec<PointRow>, errors: &[ErrorRow]) -> Result<Summary, TableError> {
@@ -103,21 +110,25 @@ impl Writer {
             tables.push((kind.name().to_owned(), schema::columns(kind)));
             done.push((part_name(kind), sheet.finish()?));
         }
-        if !errors.is_empty() {
-            let columns = schema::columns(Kind::Errors);
-            let name = part_name(Kind::Errors);
-            done.push((
-                name.clone(),
-                self.whole(&name, Kind::Errors.name(), &columns, lists::errors(errors))?,
-            ));
-            tables.push((Kind::Errors.name().to_owned(), columns));
+        let bars = std::mem::take(&mut self.error_bars);
+        let lists = [
+            (Kind::Errors, !errors.is_empty(), lists::errors(errors)),
+            (Kind::ErrorBars, !bars.is_empty(), lists::error_bars(&bars)),
+        ];
+        for (kind, _, arrays) in lists.into_iter().filter(|(_, has_rows, _)| *has_rows) {
+            let columns = schema::columns(kind);
+            let name = part_name(kind);
+            done.push((name.clone(), self.whole(&name, kind.name(), &columns, arrays)?));
+            tables.push((kind.name().to_owned(), columns));
         }
+        let compared: Vec<lists::Compared> =
+            errors.iter().map(Into::into).chain(bars.iter().map(Into::into)).collect();
         let texts = self.texts()?;
         let write_wall = (self.elapsed + begin.elapsed()).as_secs_f64();
         points.iter_mut().for_each(|row| row.write_wall = row.write_wall.or(Some(write_wall)));
         let (columns, arrays) = points::table(&Shape::of(&points), &points);
         tables.push(("points".to_owned(), columns.clone()));
-        let (meanings, meaning_arrays) = lists::columns(&tables, errors, &self.plan, &self.record);
+        let (meanings, meaning_arrays) = lists::columns(&tables, &compared, &self.plan, &self.record);
         done.push((
             "columns.parquet".to_owned(),
             self.whole("columns.parquet", "columns", &meanings, meaning_arrays)?,

@@ -50,7 +50,7 @@ fn sheet() -> Plan {
 fn threads_and_width_change_nothing() {
     for plan in [line(), sheet()] {
         let with = |threads, is_narrow| {
-            let settings = Settings { threads: Some(threads), is_narrow };
+            let settings = Settings { threads: Some(threads), is_narrow, ..Settings::default() };
             text(&run_with(&plan, &settings).unwrap().1)
         };
         let reference = with(1, false);

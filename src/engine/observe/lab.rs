@@ -25,6 +25,10 @@ pub enum Instant<const D: usize> {
 
 /// A point of the next step, reached by a Brownian bridge.
 pub struct Between<const D: usize> {
+    /// Number of a draw and a leap that come first: the half step that is over, if draws are of half
+    /// steps.
+    before: Option<(u64, Leap<D>)>,
+    /// Number of the draw that `along` follows.
     step: u64,
     /// Number of the bridge's draws, from the bits of the time: other outputs do not shift it.
     bridge: u64,
@@ -46,12 +50,22 @@ impl<const D: usize> Instant<D> {
     /// The instant `fraction` of the way into step `step` of length `dt`.
     pub fn between(program: &Program<D>, step: u64, fraction: f64, t: f64, dt: f64) -> Self {
         let mover = &program.mover;
+        let decays = program.decays(fraction * dt);
+        let (mut before, mut step, mut fraction, mut dt) = (None, step, fraction, dt);
+        if mover.takes_half_draws {
+            (step, fraction, dt) = (2 * step, 2.0 * fraction, 0.5 * dt);
+            if fraction >= 1.0 {
+                before = Some((step, mover.leap(dt, dt.sqrt())));
+                (step, fraction) = (step + 1, fraction - 1.0);
+            }
+        }
         Self::Between(Between {
+            before,
             step,
             bridge: t.to_bits() >> 12,
             along: mover.leap(fraction * dt, fraction * dt.sqrt()),
             across: mover.leap(0.0, (fraction * (1.0 - fraction) * dt).sqrt()),
-            decays: program.decays(fraction * dt),
+            decays,
         })
     }
 }
@@ -145,10 +159,13 @@ pub fn load<const D: usize>(
     }
     if let Instant::Between(between) = instant {
         let chunk_idx = (range.start / CHUNK) as u64;
-        let place = Place { block_idx: block.idx, chunk_idx, step: between.step };
-        program.mover.draw(run.width, &run.walk, place, &mut lab.scratch.noise);
-        let place = Place { step: between.bridge, ..place };
-        program.mover.draw(run.width, &run.bridge, place, &mut lab.bridge_noise);
+        let at = |step| Place { block_idx: block.idx, chunk_idx, step };
+        if let Some((step, leap)) = &between.before {
+            program.mover.draw_once(run.width, &run.walk, at(*step), &mut lab.scratch.noise);
+            leap.apply(&mut positions, &lab.scratch.noise);
+        }
+        program.mover.draw_once(run.width, &run.walk, at(between.step), &mut lab.scratch.noise);
+        program.mover.draw_once(run.width, &run.bridge, at(between.bridge), &mut lab.bridge_noise);
         between.along.apply(&mut positions, &lab.scratch.noise);
         between.across.apply(&mut positions, &lab.bridge_noise);
         for (rule, positions) in program.rules.iter().zip(&mut positions) {

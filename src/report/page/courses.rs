@@ -45,7 +45,7 @@ pub fn read(folder: &Path, kind: Kind, points: &[u32], most_times: usize) -> Res
         Kind::Total => ("amount", &["unit", "species"]),
         Kind::Covariance => ("covariance", &["unit", "species_a", "species_b"]),
         Kind::Mixing => ("gamma", &["unit", "species_a", "species_b"]),
-        Kind::Particles | Kind::Errors => return Ok(Vec::new()),
+        Kind::Particles | Kind::Errors | Kind::ErrorBars => return Ok(Vec::new()),
     };
     gathered.is_pair = words.len() == 3;
     let mut numbers = vec!["point", "output", "t", value];
