@@ -1,6 +1,6 @@
 //! What a run will cost: time from a table of measured stage costs, memory from the state.
 
-use super::{Normals, OutputKind, Plan, Stage, ZoneRate};
+use super::{Normals, Output, OutputKind, Plan, Stage, ZoneRate};
 use serde::Serialize;
 
 /// Measured on one core of a shared x86-64 server (Zen 3, AVX2) by `make bench`; nanoseconds.
@@ -17,6 +17,10 @@ mod table {
     pub(super) const MIX: f64 = 0.7;
     /// One particle observed once: positions worked out again, species restored, sums.
     pub(super) const OBSERVE: f64 = 25.0;
+    /// One value of a bin observed once: its sums, mean and error.
+    pub(super) const OBSERVE_BIN: f64 = 45.0;
+    /// One row of a table written.
+    pub(super) const WRITE_ROW: f64 = 380.0;
 }
 
 /// The estimate for a whole run.
@@ -26,10 +30,13 @@ pub struct Cost {
     pub state_bytes: u64,
     /// Bytes of sums over bins, for all groups of blocks together.
     pub bin_bytes: u64,
+    /// Bytes of what is observed: all values over bins, which are kept to the end for the measures, and the
+    /// sums or the particles of the largest observation.
+    pub output_bytes: u64,
     pub particle_steps: f64,
     /// Nanoseconds per particle and step, one entry per stage.
     pub stages: Vec<(Stage, f64)>,
-    /// Seconds of one core, observations included.
+    /// Seconds of one core, observations and their writing included.
     pub cpu_seconds: f64,
 }
 
@@ -71,20 +78,65 @@ pub fn estimate(plan: &Plan) -> Cost {
     let per_step: f64 = stages.iter().map(|(_, cost)| cost).sum();
     let particle_steps = n_particles * plan.time.n_steps as f64;
     let n_observations: usize = plan.outputs.iter().map(|output| output.times.len()).sum();
-    let nanoseconds = per_step * particle_steps + table::OBSERVE * n_observations as f64 * n_particles;
+    let n_binned: f64 =
+        plan.outputs.iter().map(|output| output.times.len() as f64 * binned_values(output)).sum();
+    let nanoseconds = per_step * particle_steps
+        + table::OBSERVE * n_observations as f64 * n_particles
+        + (table::OBSERVE_BIN + table::WRITE_ROW) * n_binned;
     let n_bins: f64 = plan.axes.iter().map(|axis| axis.bins as f64).product();
     Cost {
         state_bytes: (8.0 * n_particles * (n_axes + n_values)) as u64,
         bin_bytes: (8.0 * n_bins * (1.0 + n_values) * 2.0) as u64,
+        output_bytes: output_bytes(plan),
         particle_steps,
         stages,
         cpu_seconds: nanoseconds * 1e-9,
     }
 }
 
+/// Bins times quantities of one observation; none for what has no value per bin.
+fn binned_values(output: &Output) -> f64 {
+    match output.kind {
+        OutputKind::Profile | OutputKind::Map | OutputKind::Covariance => {
+            n_bins(output) * output.quantities.len() as f64
+        }
+        OutputKind::Total | OutputKind::Mixing | OutputKind::Particles => 0.0,
+    }
+}
+
+fn n_bins(output: &Output) -> f64 {
+    output.bins.iter().map(|&bins| bins as f64).product()
+}
+
+/// Numbers per bin that are kept of an observation, and that its first and second pass sum.
+fn numbers_per_bin(plan: &Plan, output: &Output) -> [f64; 3] {
+    let n_quantities = output.quantities.len() as f64;
+    // With zones, errors follow the mean of every component.
+    let n_slopes = if plan.mixing.is_some() { plan.components.len() as f64 } else { 0.0 };
+    match output.kind {
+        OutputKind::Profile | OutputKind::Map => {
+            [1.0 + 2.0 * n_quantities, 1.0 + n_quantities * (1.0 + n_slopes), n_quantities]
+        }
+        OutputKind::Covariance => [1.0 + n_quantities, 1.0 + 2.0 * n_quantities, n_quantities],
+        OutputKind::Total | OutputKind::Mixing | OutputKind::Particles => [0.0; 3],
+    }
+}
+
+fn output_bytes(plan: &Plan) -> u64 {
+    let mut kept = 0.0;
+    let mut largest: f64 = 0.0;
+    for output in &plan.outputs {
+        let [values, first, second] = numbers_per_bin(plan, output).map(|n| 8.0 * n * n_bins(output));
+        kept += values * output.times.len() as f64;
+        // Sums of groups of blocks beside what they are added to, first in one pass and then in the other.
+        largest = largest.max((2.0 * first).max(first + 2.0 * second) - values).max(first + second);
+    }
+    (kept + largest) as u64 + particle_output_bytes(plan)
+}
+
 /// Bytes that one whole observation of every particle takes while it is written.
-pub fn particle_output_bytes(plan: &Plan) -> u64 {
-    let columns = |output: &super::Output| (plan.axes.len() + output.quantities.len()) as u64;
+fn particle_output_bytes(plan: &Plan) -> u64 {
+    let columns = |output: &Output| (plan.axes.len() + output.quantities.len()) as u64;
     let of_particles = plan.outputs.iter().filter(|output| output.kind == OutputKind::Particles);
     of_particles.map(columns).max().unwrap_or(0) * 8 * plan.particles.count
 }

@@ -207,9 +207,10 @@ fn cost_lines(compiled: &Compiled) -> Vec<String> {
         format!("{} particle-steps", number(cost.particle_steps)),
         format!("about {} s on one core", number((cost.cpu_seconds * 100.0).round() / 100.0)),
         format!(
-            "{} MiB of particle state, {} MiB of sums over bins",
+            "{} MiB of particle state, {} MiB of sums over bins, {} MiB of outputs",
             mib(cost.state_bytes),
-            mib(cost.bin_bytes)
+            mib(cost.bin_bytes),
+            mib(cost.output_bytes)
         ),
     ]
 }

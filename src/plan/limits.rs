@@ -3,12 +3,12 @@
 //! Owns the numbers and the verdicts; a step, a number of bins or of particles that cannot work is
 //! refused at its line, with the one that would. May use `scenario` for the places.
 
-use super::cost::{self, Cost};
+use super::cost::Cost;
 use super::passes::Draft;
-use super::{Plan, ZoneRate, edges};
+use super::{OutputKind, Plan, ZoneRate, edges};
 use crate::diagnostic::codes::{N101, N102, N103, N104, N201, N202, N203, N301};
 use crate::diagnostic::{Diagnostic, number, precise};
-use crate::scenario::{MAX_BINS, Scenario};
+use crate::scenario::{self, MAX_BINS, Scenario};
 use crate::source::Span;
 use serde::Serialize;
 
@@ -383,21 +383,41 @@ fn check_memory(
     diagnostics: &mut Vec<Diagnostic>,
 ) {
     let Some(available) = memory else { return };
-    let needed =
-        cost.state_bytes.saturating_add(cost.bin_bytes).saturating_add(cost::particle_output_bytes(plan));
+    let needed = cost.state_bytes.saturating_add(cost.bin_bytes).saturating_add(cost.output_bytes);
     if needed <= available {
         return;
     }
     let gib = |bytes: u64| bytes as f64 / f64::from(1u32 << 30);
-    let per_particle = needed as f64 / plan.particles.count as f64;
-    let fitting = (available as f64 / per_particle).floor();
-    diagnostics.push(
-        Diagnostic::refused(N301, "the run does not fit into memory")
-            .at(scenario.particles.count_span, format!("{:.2} GiB of particles and bins", gib(needed)))
-            .found(format!("{:.2} GiB needed", gib(needed)))
-            .expected(format!("at most {:.2} GiB", gib(available)))
-            .help(format!("at most {fitting} particles fit")),
-    );
+    let message = Diagnostic::refused(N301, "the run does not fit into memory")
+        .found(format!("{:.2} GiB needed", gib(needed)))
+        .expected(format!("at most {:.2} GiB", gib(available)));
+    let size = |output: &scenario::Output| {
+        let n_bins: f64 = output.bins.iter().map(|&bins| bins as f64).product();
+        n_bins * output.times.len() as f64 * output.species.len() as f64
+    };
+    let is_particles = |output: &scenario::Output| output.kind == OutputKind::Particles;
+    let largest = scenario.outputs.iter().max_by(|a, b| size(a).total_cmp(&size(b)));
+    diagnostics.push(match largest {
+        // Fewer particles do not help where bins take the memory.
+        Some(largest) if 2 * cost.output_bytes > needed && !scenario.outputs.iter().any(is_particles) => {
+            message
+                .at(
+                    largest.bins_span,
+                    format!("{:.2} GiB of outputs, most of them here", gib(cost.output_bytes)),
+                )
+                .help("use fewer bins, fewer times or fewer species")
+        }
+        _ => {
+            let per_particle = needed as f64 / plan.particles.count as f64;
+            let fitting = (available as f64 / per_particle).floor();
+            message
+                .at(
+                    scenario.particles.count_span,
+                    format!("{:.2} GiB of particles, bins and outputs", gib(needed)),
+                )
+                .help(format!("at most {fitting} particles fit"))
+        }
+    });
 }
 
 #[cfg(test)]
