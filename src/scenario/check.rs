@@ -42,12 +42,21 @@ pub(super) struct Checker<'a> {
     pub axes: Vec<(String, usize)>,
     /// Concentration dimension of each species, as far as known.
     pub species_dimensions: Vec<Option<Dimension>>,
+    /// Whether the initial concentration of some species is wrong.
+    pub is_initial_wrong: bool,
     pub(super) call_stack: Vec<Call>,
     /// Constants whose values are being worked out, each for the one before it.
     pub(super) running: Vec<String>,
 }
 
 impl<'a> Checker<'a> {
+    /// Amount or mass: an amount where the scene does not say. `None` where a mistake hides what it says,
+    /// so that no follow-up comes before that mistake.
+    pub(super) fn concentration_of(&self, species: usize) -> Option<Dimension> {
+        let default = (!self.is_initial_wrong).then_some(Dimension::MOLAR_CONCENTRATION);
+        self.species_dimensions[species].or(default)
+    }
+
     pub(super) fn report(&mut self, diagnostic: Diagnostic) {
         self.diagnostics.push(diagnostic);
     }
@@ -207,7 +216,7 @@ impl<'a> Checker<'a> {
                 Some(Expr::constant(value, kind, span))
             }
             Origin::Species(idx) if allow.species => {
-                let dimension = self.species_dimensions[idx].unwrap_or(Dimension::MOLAR_CONCENTRATION);
+                let dimension = self.concentration_of(idx)?;
                 Some(Expr::leaf(Node::Species(idx), dimension, span))
             }
             _ if is_doubtful => None,

@@ -66,6 +66,7 @@ pub fn resolve(
         diagnostics,
         axes: super::geometry::axis_names(&statements),
         species_dimensions: vec![None; statements.species.len()],
+        is_initial_wrong: false,
         call_stack: Vec::new(),
         running: Vec::new(),
     };

@@ -267,7 +267,7 @@ fn path_part<'a>(
         other => other,
     };
     let first = *species.first()?;
-    let concentration = checker.species_dimensions[first].unwrap_or(Dimension::MOLAR_CONCENTRATION);
+    let concentration = checker.concentration_of(first)?;
     let dimension = match kind {
         OutputKind::Mixing => Dimension::NONE,
         kind => kind.dimension(concentration, checker.axes.len()),
@@ -312,8 +312,7 @@ fn reference_part(
         return None;
     }
     let kind = reference.target.outputs()[0];
-    let concentration = checker.species_dimensions[reference.target.species()];
-    let concentration = concentration.unwrap_or(Dimension::MOLAR_CONCENTRATION);
+    let concentration = checker.concentration_of(reference.target.species())?;
     let dimension = match kind {
         OutputKind::Mixing => Dimension::NONE,
         kind => kind.dimension(concentration, checker.axes.len()),

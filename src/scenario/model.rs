@@ -153,6 +153,7 @@ fn initial_of<'a>(
                 checker.report(message);
             }
             initials[idx] = Initial::Wrong;
+            checker.is_initial_wrong = true;
             return;
         }
         _ => return,
@@ -198,6 +199,7 @@ fn initial_of<'a>(
         (Some(expr), Some(_)) => Initial::Known(expr),
         _ => Initial::Wrong,
     };
+    checker.is_initial_wrong |= matches!(initials[idx], Initial::Wrong);
 }
 
 /// A species without a dimension of its own takes that of its reaction's other species.

@@ -268,7 +268,7 @@ fn output_unit(
     };
     let n_axes = checker.axes.len();
     for &idx in species {
-        let concentration = checker.species_dimensions[idx].unwrap_or(Dimension::MOLAR_CONCENTRATION);
+        let Some(concentration) = checker.concentration_of(idx) else { continue };
         let expected = kind.dimension(concentration, n_axes);
         if expected != unit.dimension {
             checker.report(

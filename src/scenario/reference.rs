@@ -160,8 +160,7 @@ fn solution<'a>(
     }
     let expr = checker.check(&written.value, Allow::REFERENCE)?;
     let target = target?;
-    let concentration =
-        checker.species_dimensions[target.species()].unwrap_or(Dimension::MOLAR_CONCENTRATION);
+    let concentration = checker.concentration_of(target.species())?;
     let expected = match target {
         Target::Mixing(..) => Dimension::NONE,
         other => other.outputs()[0].dimension(concentration, checker.axes.len()),
@@ -191,14 +190,16 @@ fn item_solution<'a>(
     target: Option<Target>,
 ) -> Option<Solution> {
     let slots = assign(checker, item, arguments);
-    let concentration = target.and_then(|target| checker.species_dimensions[target.species()]);
-    let concentration = concentration.unwrap_or(Dimension::MOLAR_CONCENTRATION);
+    let concentration = match target {
+        Some(target) => checker.concentration_of(target.species()),
+        None => Some(Dimension::MOLAR_CONCENTRATION),
+    };
     let mut is_right = true;
     let mut values = Vec::new();
     let mut missing = Vec::new();
     for (argument, written) in item.arguments.iter().zip(slots?) {
         let dimension = match argument.dimension {
-            ArgumentDimension::Fixed(dimension) => dimension,
+            ArgumentDimension::Fixed(dimension) => Some(dimension),
             ArgumentDimension::Concentration => concentration,
         };
         let Some(written) = written else {
@@ -210,6 +211,12 @@ fn item_solution<'a>(
         };
         let what = format!("argument `{}` of `{}`", argument.name, item.name);
         let (low, high) = argument.range;
+        let Some(dimension) = dimension else {
+            // Its names count as used, and what is wrong in itself is told.
+            checker.check(written, Allow::CONSTANT);
+            is_right = false;
+            continue;
+        };
         let value = checker.slot(written, &what, dimension).and_then(|value| {
             let rule = format!("{} ({})", argument.doc, allowed(low, high));
             let is_fine = (low..=high).contains(&value.value);
