@@ -142,7 +142,10 @@ fn particles_per_bin(
     let place = |message: Diagnostic| {
         message
             .at(bins_span(scenario), format!("{} bins", n_bins(plan)))
-            .also(scenario.particles.count_span, format!("{} particles", plan.particles.count))
+            .also(scenario.particles.count_span, {
+                let plural = if plan.particles.count == 1 { "" } else { "s" };
+                format!("{} particle{plural}", plan.particles.count)
+            })
             .found(format!("{} particles per bin", short(per_bin)))
             .expected(format!("at least {FEW_PER_BIN}"))
             .help(format!("use at least {needed} particles{fewer_bins}"))

@@ -212,6 +212,9 @@ impl<'a> Scope<'a> {
                 message = message.also(entry.span, format!("`{candidate}` is defined here"));
             }
         }
+        if name == "l" {
+            message = message.help("the litre is `L`: `mg/L`");
+        }
         if ["x", "y", "z"].contains(&name) {
             message = message.note(format!("the domain has no axis `{name}`"));
         }
