@@ -7,7 +7,7 @@ use lamella::diagnostic::{Diagnostic, codes};
 use lamella::report::ExpectationOutcome;
 use lamella::sweep::frame::Session;
 use lamella::sweep::gather::{Gather, GatherError, Gathered};
-use lamella::sweep::{Journal, JournalError, Points};
+use lamella::sweep::{Journal, JournalError, Points, manifest};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -151,6 +151,9 @@ pub(crate) fn gather_and_tell(
     let gathered = gather.write(out).map_err(|error| match &error {
         GatherError::Journal(_) | GatherError::Table(_) | GatherError::Description(_) => failed(&error),
     })?;
+    manifest::write(out, &gathered.files).map_err(|error| {
+        failed(&format!("cannot write {}: {error}", out.join(manifest::MANIFEST).display()))
+    })?;
     let report = super::report::write(out)?;
     if !terminal.is_quiet() {
         terminal.product(&summary(&gathered, out, &report.page))?;
@@ -203,7 +206,20 @@ pub(crate) fn status(arguments: &StatusArguments, terminal: &Terminal) -> Comman
         ("replicates", format!("{} done, {} failed", grouped(done as u64), grouped(bad as u64))),
         ("journals", format!("{}, {damaged} damaged places", journals.len())),
     ];
-    let text: String = lines.into_iter().map(|(name, text)| format!("{name:<12}{text}\n")).collect();
+    let mut text: String = lines.into_iter().map(|(name, text)| format!("{name:<12}{text}\n")).collect();
+    let problems = manifest::check(&arguments.folder);
+    text += &match &problems {
+        None => format!("{:<12}not made yet: `lamella gather` makes them\n", "tables"),
+        Some(problems) if problems.is_empty() => format!("{:<12}as they were written\n", "tables"),
+        Some(problems) => {
+            let line =
+                |problem: &manifest::Problem| format!("{:<12}{} {}\n", "tables", problem.name, problem.what);
+            let lines: String = problems.iter().map(line).collect();
+            let folder = arguments.folder.display();
+            format!("{lines}{:<12}`lamella gather {folder}` makes them again from the journals\n", "")
+        }
+    };
     terminal.product(&text)?;
-    Ok(Exit::Done)
+    let is_well = problems.is_none_or(|problems| problems.is_empty());
+    Ok(if is_well { Exit::Done } else { Exit::Failed })
 }

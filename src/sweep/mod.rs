@@ -8,6 +8,7 @@ pub mod expect;
 pub mod frame;
 pub mod gather;
 pub mod journal;
+pub mod manifest;
 pub mod points;
 mod queue;
 pub mod replicate;

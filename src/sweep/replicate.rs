@@ -134,7 +134,7 @@ impl Task<'_> {
 fn fill(row: &mut PointRow, outcome: &Outcome) {
     (row.wall, row.loop_wall, row.cpu) = (outcome.wall, outcome.loop_wall, outcome.cpu);
     row.steps = outcome.n_steps;
-    row.mass_defect = outcome.mass_defect.iter().copied().reduce(f64::max);
+    row.mass_defect = (!outcome.mass_defect.is_empty()).then(|| outcome.worst_defect());
 }
 
 fn code_of(error: &RunError) -> String {

@@ -40,7 +40,7 @@ pub fn data_files(folder: &Folder, out: &str) -> Vec<(String, Vec<u8>)> {
     let inside = format!("{out}/");
     let names = folder.files().into_iter().filter(|name| name.starts_with(&inside));
     // The report shows times and the machine.
-    let apart = ["/journal/", "/points.parquet", "/report"];
+    let apart = ["/journal/", "/points.parquet", "/report", "/manifest.json", "/ro-crate-metadata.json"];
     let names = names.filter(|name| !apart.iter().any(|part| name.contains(part)));
     names
         .map(|name| {
