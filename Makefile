@@ -35,8 +35,9 @@ bench: cargo ## Measure the hot loops (takes minutes; close other programs first
 bless: cargo ## Accept the present output of all snapshot tests; look at the difference before you commit
 	INSTA_UPDATE=always LAMELLA_BLESS=1 $(CARGO) test --release
 
-soak: cargo ## Run the experiments in full and feed a million damaged scenes to the checker (takes many minutes)
+soak: cargo ## Run the experiments in full, kill sweeps 200 times, check a million damaged scenes (takes half an hour)
 	LAMELLA_SOAK=1 $(CARGO) test --release --test experiments --test error_bars -- --nocapture --test-threads 1
+	LAMELLA_SOAK=1 $(CARGO) test --release --test sweeps killed
 	$(CARGO) run --release --example fuzz_check -- 1000000
 
 clean: ## Remove what was built; results stay
