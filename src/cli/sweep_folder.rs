@@ -130,15 +130,8 @@ pub(crate) fn open(folder: &Path) -> Result<(Vec<Journal>, load::Sweep), Stopped
     Ok((journals, loaded))
 }
 
-/// Writes the tables and says what is in them.
-pub(crate) fn gather_and_tell(
-    loaded: &load::Sweep,
-    points: &Points,
-    journals: &[&Journal],
-    out: &Path,
-    terminal: &Terminal,
-) -> CommandResult {
-    let gather = Gather {
+fn gather_of<'a>(loaded: &'a load::Sweep, points: &'a Points, journals: &'a [&'a Journal]) -> Gather<'a> {
+    Gather {
         scene: &loaded.scene,
         points,
         journals,
@@ -147,7 +140,18 @@ pub(crate) fn gather_and_tell(
         reports: &loaded.scenario.reports,
         scene_name: &loaded.scene_name,
         version: env!("CARGO_PKG_VERSION"),
-    };
+    }
+}
+
+/// Writes the tables and says what is in them.
+pub(crate) fn gather_and_tell(
+    loaded: &load::Sweep,
+    points: &Points,
+    journals: &[&Journal],
+    out: &Path,
+    terminal: &Terminal,
+) -> CommandResult {
+    let gather = gather_of(loaded, points, journals);
     let gathered = gather.write(out).map_err(|error| match &error {
         GatherError::Journal(_) | GatherError::Table(_) | GatherError::Description(_) => failed(&error),
     })?;
@@ -156,7 +160,12 @@ pub(crate) fn gather_and_tell(
     })?;
     let report = super::report::write(out)?;
     if !terminal.is_quiet() {
-        terminal.product(&summary(&gathered, out, &report.page))?;
+        let text = if terminal.is_json() {
+            json(&gathered, out, &report.page)
+        } else {
+            summary(&gathered, out, &report.page)
+        };
+        terminal.product(&text)?;
     }
     let is_well = gathered.is_met() && gathered.n_failed == 0 && gathered.n_missing == 0;
     Ok(if is_well { Exit::Done } else { Exit::Failed })
@@ -183,6 +192,20 @@ fn summary(gathered: &Gathered, out: &Path, report: &Path) -> String {
     lines.into_iter().map(|(name, text)| format!("{name:<12}{text}\n")).collect()
 }
 
+/// One object on one line.
+fn json(gathered: &Gathered, out: &Path, report: &Path) -> String {
+    let summary = serde_json::json!({
+        "results": out.display().to_string(),
+        "report": report.display().to_string(),
+        "points": gathered.n_points,
+        "done": gathered.n_done,
+        "failed": gathered.n_failed,
+        "missing": gathered.n_missing,
+        "expectations": gathered.expectations,
+    });
+    format!("{summary}\n")
+}
+
 /// Tell what a sweep has and what is missing
 #[derive(clap::Args)]
 pub(crate) struct StatusArguments {
@@ -194,32 +217,70 @@ pub(crate) fn status(arguments: &StatusArguments, terminal: &Terminal) -> Comman
     let (journals, loaded) = open(&arguments.folder)?;
     let pool = pool(machine::n_threads())?;
     let points = pool.install(|| Points::of(&loaded.scene));
-    let (mut done, mut bad) = (0, 0);
-    for journal in &journals {
-        let (well, not) = journal.counts();
-        (done, bad) = (done + well, bad + not);
-    }
+    let all: Vec<&Journal> = journals.iter().collect();
+    let standing = pool.install(|| gather_of(&loaded, &points, &all).standing());
+    let standing = standing.map_err(|error| failed(&error))?;
     let damaged: usize = journals.iter().map(|journal| journal.damaged.len()).sum();
-    let lines = [
-        ("sweep", format!("{} of {}", loaded.scene.sweep.name, loaded.scene_name)),
-        ("points", format!("{}, {} skipped", grouped(points.len() as u64), grouped(points.n_skipped))),
-        ("replicates", format!("{} done, {} failed", grouped(done as u64), grouped(bad as u64))),
-        ("journals", format!("{}, {damaged} damaged places", journals.len())),
-    ];
-    let mut text: String = lines.into_iter().map(|(name, text)| format!("{name:<12}{text}\n")).collect();
     let problems = manifest::check(&arguments.folder);
-    text += &match &problems {
-        None => format!("{:<12}not made yet: `lamella gather` makes them\n", "tables"),
-        Some(problems) if problems.is_empty() => format!("{:<12}as they were written\n", "tables"),
-        Some(problems) => {
-            let line =
-                |problem: &manifest::Problem| format!("{:<12}{} {}\n", "tables", problem.name, problem.what);
-            let lines: String = problems.iter().map(line).collect();
-            let folder = arguments.folder.display();
-            format!("{lines}{:<12}`lamella gather {folder}` makes them again from the journals\n", "")
-        }
+    let state = State {
+        sweep: loaded.scene.sweep.name.clone(),
+        scene: loaded.scene_name.clone(),
+        points: points.len() as u64,
+        skipped: points.n_skipped,
+        done: standing.n_done,
+        failed: standing.n_failed,
+        incomplete: standing.n_missing,
+        journals: journals.len(),
+        damaged_places: damaged,
+        tables: problems.clone(),
+    };
+    let text = match terminal.is_json() {
+        true => serde_json::to_string(&state).expect("strings and numbers serialise") + "\n",
+        false => state.text(&arguments.folder),
     };
     terminal.product(&text)?;
     let is_well = problems.is_none_or(|problems| problems.is_empty());
     Ok(if is_well { Exit::Done } else { Exit::Failed })
+}
+
+/// What is there.
+#[derive(serde::Serialize)]
+struct State {
+    sweep: String,
+    scene: String,
+    points: u64,
+    skipped: u64,
+    done: u64,
+    failed: u64,
+    /// Points with replicates that are missing.
+    incomplete: u64,
+    journals: usize,
+    damaged_places: usize,
+    /// Tables that are not what was written; null before there are any.
+    tables: Option<Vec<manifest::Problem>>,
+}
+
+impl State {
+    fn text(&self, folder: &Path) -> String {
+        let lines = [
+            ("sweep", format!("{} of {}", self.sweep, self.scene)),
+            ("points", format!("{}, {} skipped", grouped(self.points), grouped(self.skipped))),
+            ("replicates", format!("{} done, {} failed", grouped(self.done), grouped(self.failed))),
+            ("incomplete", format!("{} points", grouped(self.incomplete))),
+            ("journals", format!("{}, {} damaged places", self.journals, self.damaged_places)),
+        ];
+        let text: String = lines.into_iter().map(|(name, text)| format!("{name:<12}{text}\n")).collect();
+        text + &match &self.tables {
+            None => format!("{:<12}not made yet: `lamella gather` makes them\n", "tables"),
+            Some(problems) if problems.is_empty() => format!("{:<12}as they were written\n", "tables"),
+            Some(problems) => {
+                let line = |problem: &manifest::Problem| {
+                    format!("{:<12}{} {}\n", "tables", problem.name, problem.what)
+                };
+                let lines: String = problems.iter().map(line).collect();
+                let folder = folder.display();
+                format!("{lines}{:<12}`lamella gather {folder}` makes them again from the journals\n", "")
+            }
+        }
+    }
 }

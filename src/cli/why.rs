@@ -34,26 +34,47 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
     let (_, compiled) =
         now.scene.compile(point.combination).map_err(|message| Stopped { exit: Exit::Failed, message })?;
     let (plan, key) = now.scene.replicate(&compiled.plan, point.combination, replicate);
-    let mut text = format!("point {number}/{replicate} ({name})\nkey {}\n", key_text(&key));
+    let head = Head { point: number, replicate, name, key: key_text(&key) };
     if let Some((journal, entry)) = find(&journals, &key) {
-        text += &known(journal, entry)?;
-        terminal.product(&text)?;
-        return Ok(Exit::Done);
+        let (will_run, reason) = known(journal, entry)?;
+        return head.tell(will_run, &reason, terminal);
     }
     let Some((old, old_plan)) = counterpart(&journals, &now, point.combination, replicate)? else {
-        text += "will run: no point with these values was ever run\n";
-        terminal.product(&text)?;
-        return Ok(Exit::Done);
+        return head.tell(true, "no point with these values was ever run", terminal);
     };
     let Some(found) = difference(&old_plan, &plan) else {
-        text += "will run: the plan is that of a recorded point, but its frame is damaged\n";
-        terminal.product(&text)?;
-        return Ok(Exit::Done);
+        return head.tell(true, "it was run, but its record is damaged", terminal);
     };
-    text += &format!("will run: `{}` was {} and is {}\n", found.path, found.before, found.now);
-    terminal.product(&text)?;
+    let reason = format!("`{}` was {} and is {}", found.path, found.before, found.now);
+    let exit = head.tell(true, &reason, terminal)?;
     show(&old, &now, &found, terminal);
-    Ok(Exit::Done)
+    Ok(exit)
+}
+
+/// What is asked about.
+struct Head {
+    point: u32,
+    replicate: u32,
+    name: String,
+    key: String,
+}
+
+impl Head {
+    fn tell(&self, will_run: bool, reason: &str, terminal: &Terminal) -> CommandResult {
+        let Self { point, replicate, name, key } = self;
+        let text = if terminal.is_json() {
+            let answer = serde_json::json!({
+                "point": point, "replicate": replicate, "name": name, "key": key,
+                "will_run": will_run, "reason": reason,
+            });
+            format!("{answer}\n")
+        } else {
+            let verdict = if will_run { "will run" } else { "will not run" };
+            format!("point {point}/{replicate} ({name})\nkey {key}\n{verdict}: {reason}\n")
+        };
+        terminal.product(&text)?;
+        Ok(Exit::Done)
+    }
 }
 
 fn find<'j>(journals: &'j [Journal], key: &lamella::sweep::Key) -> Option<(&'j Journal, Entry)> {
@@ -61,14 +82,14 @@ fn find<'j>(journals: &'j [Journal], key: &lamella::sweep::Key) -> Option<(&'j J
     found.min_by_key(|(_, entry)| !entry.is_done())
 }
 
-fn known(journal: &Journal, entry: Entry) -> Result<String, Stopped> {
+/// Whether a recorded replicate runs again, and why.
+fn known(journal: &Journal, entry: Entry) -> Result<(bool, String), Stopped> {
     let recorded = journal.replicate(entry).map_err(|error| super::sweep::failed(&error))?;
     let when = date(recorded.row.finished);
     Ok(match (&recorded.row.error_code, &recorded.row.error_message) {
-        (None, _) => format!("will not run: complete since {when}, version {}\n", recorded.row.version),
+        (None, _) => (false, format!("complete since {when}, version {}", recorded.row.version)),
         (Some(code), message) => {
-            let message = message.as_deref().unwrap_or_default();
-            format!("will run: it failed on {when} with {code}: {message}\n")
+            (true, format!("it failed on {when} with {code}: {}", message.as_deref().unwrap_or_default()))
         }
     })
 }

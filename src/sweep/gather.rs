@@ -42,6 +42,15 @@ impl Gathered {
     }
 }
 
+/// How much of a sweep is there.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Standing {
+    pub n_done: u64,
+    pub n_failed: u64,
+    /// Points that are not complete.
+    pub n_missing: u64,
+}
+
 #[derive(Debug)]
 pub enum GatherError {
     Journal(JournalError),
@@ -122,6 +131,46 @@ impl Gather<'_> {
         let description = description.to_json().map_err(GatherError::Description)?;
         gathered.files = gatherer.finish(&[(SWEEP_FILE, &description)])?.files;
         Ok(gathered)
+    }
+
+    /// What the journals have of the sweep as it is defined now.
+    pub fn standing(&self) -> Result<Standing, JournalError> {
+        let each: Vec<Result<Standing, JournalError>> =
+            self.points.list.par_iter().map(|point| self.standing_of(point)).collect();
+        each.into_iter().try_fold(Standing::default(), |sum, own| {
+            let own = own?;
+            Ok(Standing {
+                n_done: sum.n_done + own.n_done,
+                n_failed: sum.n_failed + own.n_failed,
+                n_missing: sum.n_missing + own.n_missing,
+            })
+        })
+    }
+
+    fn standing_of(&self, point: &Point) -> Result<Standing, JournalError> {
+        let mut standing = Standing::default();
+        if self.scene.sweep.replicates.until.is_some() {
+            let whole = self.whole(point)?;
+            let is_done = |replicate: &&Replicate| replicate.row.status == Status::Done;
+            standing.n_done = whole.replicates.iter().filter(is_done).count() as u64;
+            standing.n_failed = whole.replicates.len() as u64 - standing.n_done;
+            standing.n_missing = u64::from(whole.is_missing);
+            return Ok(standing);
+        }
+        let compiled = self.scene.compile(point.combination).ok().filter(|_| point.refusal.is_none());
+        let Some((_, compiled)) = compiled else {
+            return Ok(Standing { n_failed: 1, ..standing });
+        };
+        for replicate in 0..self.scene.sweep.replicates.least {
+            let (_, key) = self.scene.replicate(&compiled.plan, point.combination, replicate);
+            let entries = self.journals.iter().filter_map(|journal| journal.entry(&key));
+            match entries.map(|entry| entry.is_done()).reduce(|a, b| a | b) {
+                Some(true) => standing.n_done += 1,
+                Some(false) => standing.n_failed += 1,
+                None => standing.n_missing = 1,
+            }
+        }
+        Ok(standing)
     }
 
     /// Columns in the order of the axes, then what the first replicate that ended well has, with the

@@ -26,7 +26,7 @@ struct Listed {
 }
 
 /// A file that is not what it was.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Problem {
     pub name: String,
     pub what: &'static str,

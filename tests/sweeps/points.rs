@@ -120,6 +120,14 @@ fn axes_can_be_given_on_the_command_line() {
 fn why_names_the_line() {
     let folder = run_once();
     folder.lamella(&["why", "out", "0"]).exits(0).gives("will not run: complete since");
+    folder
+        .lamella(&["status", "out"])
+        .exits(0)
+        .gives("replicates  12 done, 0 failed")
+        .gives("incomplete  0 points");
+    let json = folder.lamella(&["status", "out", "--message-format", "json"]).exits(0).stdout;
+    let state: serde_json::Value = serde_json::from_str(&json).unwrap();
+    assert_eq!((&state["done"], &state["points"]), (&12.into(), &6.into()));
     let text = scene_with(SWEEP).replace("run to 4 s, step 1 s", "run to 4 s, step 500 ms");
     folder.write("s.lam", &text);
     let why = folder.lamella(&["why", "out", "3/1"]).exits(0);
