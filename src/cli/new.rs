@@ -45,6 +45,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
     }
     write_new(&path, arguments.template.text())?;
     let name = path.display();
-    terminal.remark(&format!("wrote {name}\nnext: lamella run {name} --plot"));
+    let word = super::load::shell_word(&name.to_string());
+    terminal.remark(&format!("wrote {name}\nnext: lamella run {word} --plot"));
     Ok(Exit::Done)
 }

@@ -286,8 +286,17 @@ impl<'a> Story<'a> {
             high: high / length.factor,
             spacing: Spacing::Linear,
         };
+        // A third axis is cut in the middle: without its place the panel would read like a mean.
+        let name_of = |axis: usize| ["x", "y", "z"].get(axis).copied().unwrap_or_default();
+        let place_of = |axis: &usize| grid.centres(*axis).and_then(|c| c.get(c.len() / 2).copied());
+        let cut = |axis: &usize| {
+            let place = place_of(axis)? / length.factor;
+            Some(format!(", {} = {} {}", name_of(*axis), crate::diagnostic::number(place), length.text))
+        };
+        let cut: String = rest.iter().filter_map(cut).collect();
+        let title = format!("{} at {}{cut}", self.names(output.quantities[q]), self.time_text(snapshot.t));
         Some(Panel {
-            title: format!("{} at {}", self.names(output.quantities[q]), self.time_text(snapshot.t)),
+            title,
             x_label: labelled(AXES[a], &length.text),
             y_label: labelled(AXES[b], &length.text),
             x: scale(reach[0], reach[1]),

@@ -97,8 +97,13 @@ fn in_order(mut diagnostics: Vec<Diagnostic>, has_syntax_errors: bool) -> Vec<Di
         (weight, diagnostic.primary_span().map(|span| (span.file, span.start)))
     };
     diagnostics.sort_by_key(rank);
+    let is_wrong = has_syntax_errors || crate::diagnostic::any_fatal(&diagnostics);
     let mut seen = std::collections::BTreeSet::new();
     diagnostics.retain(|diagnostic| {
+        // An output may be what is wrong.
+        if is_wrong && diagnostic.code == M018 {
+            return false;
+        }
         let is_new = seen.insert((diagnostic.code, diagnostic.primary_span(), diagnostic.message.clone()));
         is_new && !(has_syntax_errors && diagnostic.code == M001)
     });
