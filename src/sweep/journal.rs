@@ -36,9 +36,8 @@ const SYNC: Duration = Duration::from_secs(2);
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Entry {
     offset: u64,
-    length: u64,
-    pub status: Status,
     pub session: u32,
+    pub status: Status,
 }
 
 impl Entry {
@@ -150,7 +149,7 @@ impl Journal {
             reader.seek(SeekFrom::Start(offset))?;
             match read_frame(&mut reader, length - offset, &mut payload)? {
                 Some((kind, size)) => {
-                    self.note(kind, offset, size, &payload);
+                    self.note(kind, offset, &payload);
                     offset += size;
                     self.end = offset;
                 }
@@ -167,12 +166,12 @@ impl Journal {
         Ok(())
     }
 
-    fn note(&mut self, kind: u32, offset: u64, length: u64, mut payload: &[u8]) {
+    fn note(&mut self, kind: u32, offset: u64, mut payload: &[u8]) {
         match kind {
             REPLICATE => {
                 if let Some(head) = Head::take(&mut payload) {
                     let (status, session) = (head.row.status, head.session);
-                    self.entries.insert(head.key, Entry { offset, length, status, session });
+                    self.entries.insert(head.key, Entry { offset, status, session });
                 }
             }
             SESSION => self.sessions.extend(Session::take(&mut payload)),
@@ -205,10 +204,13 @@ impl Journal {
     /// Reads a replicate again; its checksum is looked at once more.
     pub fn replicate(&self, entry: Entry) -> Result<Replicate, JournalError> {
         let damaged = || JournalError::Damaged { path: self.path.clone(), offset: entry.offset };
-        let mut bytes = vec![0; entry.length as usize];
+        let mut head = [0; HEAD];
+        read_at(&self.file, &mut head, entry.offset).map_err(|reason| self.system("read", reason))?;
+        let size = size_of(&head).filter(|size| *size <= self.end - entry.offset).ok_or_else(damaged)?;
+        let mut bytes = vec![0; size as usize];
         read_at(&self.file, &mut bytes, entry.offset).map_err(|reason| self.system("read", reason))?;
         let mut payload = Vec::new();
-        let frame = read_frame(&mut &bytes[..], entry.length, &mut payload);
+        let frame = read_frame(&mut &bytes[..], size, &mut payload);
         match frame {
             Ok(Some((REPLICATE, _))) => Replicate::take(&mut &payload[..]).ok_or_else(damaged),
             _ => Err(damaged()),
@@ -229,8 +231,8 @@ impl Journal {
         replicate.put(&mut payload);
         let offset = self.end;
         self.append(REPLICATE, &payload)?;
-        let (length, status) = (self.end - offset, replicate.row.status);
-        self.entries.insert(replicate.key, Entry { offset, length, status, session: replicate.session });
+        let status = replicate.row.status;
+        self.entries.insert(replicate.key, Entry { offset, status, session: replicate.session });
         if self.synced.elapsed() > SYNC {
             self.sync()?;
         }
@@ -266,6 +268,12 @@ fn checksum(bytes: &[u8]) -> [u8; CHECKSUM] {
     std::array::from_fn(|idx| hash[idx])
 }
 
+/// The size of the frame that begins so; nothing if none does.
+fn size_of(head: &[u8; HEAD]) -> Option<u64> {
+    let length = u64::from_le_bytes(std::array::from_fn(|idx| head[8 + idx]));
+    (head[..4] == MAGIC && length <= MAX_PAYLOAD).then(|| length + (HEAD + CHECKSUM) as u64)
+}
+
 /// Kind and size of the frame that begins here, its payload in `payload`; nothing if it is not whole.
 fn read_frame(
     reader: &mut impl Read,
@@ -278,11 +286,8 @@ fn read_frame(
     let mut head = [0; HEAD];
     reader.read_exact(&mut head)?;
     let kind = u32::from_le_bytes([head[4], head[5], head[6], head[7]]);
-    let length = u64::from_le_bytes(std::array::from_fn(|idx| head[8 + idx]));
-    let size = length.saturating_add((HEAD + CHECKSUM) as u64);
-    if head[..4] != MAGIC || length > MAX_PAYLOAD || size > left {
-        return Ok(None);
-    }
+    let Some(size) = size_of(&head).filter(|size| *size <= left) else { return Ok(None) };
+    let length = size - (HEAD + CHECKSUM) as u64;
     payload.clear();
     payload.extend_from_slice(&head);
     payload.resize(HEAD + length as usize, 0);

@@ -19,7 +19,7 @@ pub struct Point {
     /// Bytes of particle state.
     pub bytes: u64,
     /// Why it cannot be run.
-    pub refusal: Option<Refusal>,
+    pub refusal: Option<Box<Refusal>>,
 }
 
 /// The message of a point that does not pass the checks.
@@ -45,9 +45,8 @@ impl Points {
     /// Works all combinations out, on all threads of the pool.
     pub fn of(scene: &Scene) -> Self {
         let n = scene.n_combinations();
-        let all: Vec<Option<Point>> =
-            (0..n).into_par_iter().map(|combination| point(scene, combination)).collect();
-        let list: Vec<Point> = all.into_iter().flatten().collect();
+        let list: Vec<Point> =
+            (0..n).into_par_iter().filter_map(|combination| point(scene, combination)).collect();
         let n_skipped = n - list.len() as u64;
         Self { list, n_skipped }
     }
@@ -76,7 +75,7 @@ fn point(scene: &Scene, combination: u64) -> Option<Point> {
         combination,
         cost: 0.0,
         bytes: 0,
-        refusal: Some(Refusal::of(diagnostic)),
+        refusal: Some(Box::new(Refusal::of(diagnostic))),
     };
     let scenario = match scene.scenario(combination) {
         Ok(scenario) => scenario,
