@@ -4,7 +4,7 @@ use super::interrupt::Interrupt;
 use super::sweep::{failed, pool, surroundings};
 use super::sweep_folder::{Which, open, point_of};
 use super::text::grouped;
-use super::why::is_sweep;
+use super::why::{check_replicate, is_sweep};
 use super::{CommandResult, Exit, Stopped, Terminal, load, machine, run as run_command};
 use lamella::diagnostic::{Diagnostic, codes};
 use lamella::engine::Control;
@@ -205,6 +205,7 @@ pub(crate) fn repro(arguments: &ReproArguments, terminal: &Terminal) -> CommandR
     let (_, loaded) = open(&arguments.folder)?;
     let points = pool(threads)?.install(|| Points::of(&loaded.scene));
     let point = point_of(&points, arguments.point)?;
+    check_replicate(&loaded, arguments.point)?;
     let Which { point: number, replicate } = arguments.point;
     let seed = loaded.scene.seed(point.combination, replicate);
     let out = arguments

@@ -117,6 +117,38 @@ fn axes_can_be_given_on_the_command_line() {
 }
 
 #[test]
+fn what_would_be_set_twice_is_refused() {
+    let folder = Folder::new();
+    folder.write("s.lam", scene_with(SWEEP));
+    let set = folder.lamella(&["sweep", "s.lam", "--set", "D=1e-4 m^2/s"]).exits(2);
+    set.says("[W002]").says("`--set` gives `D` one value, and the sweep `study` gives it many");
+    folder.lamella(&["sweep", "s.lam", "--set", "particles=50", "--out", "out"]).exits(0);
+    let both = folder.lamella(&["sweep", "s.lam", "study", "--over", "step=1s"]).exits(2);
+    both.says("[F120]").says("`study` names a sweep of the scene");
+    for axis in ["D linspace(1e-4 m^2/s, 1e-4 m^2/s, 2)", "particles linspace(100, 100, 3)"] {
+        folder.write("s.lam", scene_with(axis));
+        folder.lamella(&["check", "s.lam"]).exits(2).says("[W002]").says("gives the same value twice");
+    }
+    // Whole numbers that rounding makes equal are one value: 10, 10.5, 11.
+    folder.write("s.lam", scene_with("particles linspace(10, 11, 3)"));
+    folder.lamella(&["sweep", "s.lam", "--out", "rounded"]).exits(0).says("2 points");
+}
+
+#[test]
+fn a_replicate_beyond_the_sweep_is_refused() {
+    let folder = run_once();
+    for command in ["why", "repro"] {
+        let refused = folder.lamella(&[command, "out", "2/77"]).exits(2);
+        refused.says("[F122]").says("point 2 has no replicate 77").says("0 to 1");
+    }
+    folder.lamella(&["why", "out", "2/1"]).exits(0);
+    let more = SWEEP.replace("replicates 2", "replicates 2 .. 4 until stderr(err) < 90 % of mean(err)");
+    folder.write("s.lam", scene_with(&more));
+    folder.lamella(&["why", "out", "2/3"]).exits(0);
+    folder.lamella(&["why", "out", "2/4"]).exits(2).says("0 to 3");
+}
+
+#[test]
 fn why_names_the_line() {
     let folder = run_once();
     folder.lamella(&["why", "out", "0"]).exits(0).gives("will not run: complete since");
