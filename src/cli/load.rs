@@ -148,7 +148,8 @@ fn pick(
     (path, scene_name): (String, String),
     terminal: Option<&Terminal>,
 ) -> Result<Option<Sweep>, Stopped> {
-    let options = Options { passes: Selection::All, memory: machine::available_memory() };
+    // What fits into memory is a matter of the machine that runs a point, and never of its tables.
+    let options = Options { passes: Selection::All, memory: None };
     let settings = &Settings { sweep: name.map(str::to_owned), ..settings.clone() };
     let mut checked = lamella::check_with(sources, further, settings, &options);
     if let Some(terminal) = terminal {

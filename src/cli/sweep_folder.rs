@@ -73,22 +73,48 @@ pub(crate) fn point_of(points: &Points, which: Which) -> Result<&lamella::sweep:
 /// An open folder.
 pub(crate) struct Folder {
     pub(crate) journal: Journal,
+    /// Of other shards: what they have need not run.
+    pub(crate) others: Vec<Journal>,
 }
 
 impl Folder {
     pub(crate) fn open(out: &Path, shard: Shard) -> Result<Self, Stopped> {
         let name = format!("shard-{:04}-of-{:04}.journal", shard.number, shard.of);
-        let journal = Journal::open(&out.join("journal").join(name)).map_err(|error| failed(&error))?;
-        Ok(Self { journal })
+        let journal = Journal::open(&out.join("journal").join(&name)).map_err(|error| failed(&error))?;
+        let paths = journal_paths(out).into_iter().filter(|path| path.file_name() != Some(name.as_ref()));
+        let others: Result<Vec<Journal>, JournalError> = paths.map(|path| Journal::look(&path)).collect();
+        Ok(Self { journal, others: others.map_err(|error| failed(&error))? })
+    }
+
+    /// Refuses a folder that holds another sweep: its tables would be lost.
+    pub(crate) fn must_hold(&self, loaded: &load::Sweep, out: &Path) -> Result<(), Stopped> {
+        let sessions = self.others.iter().chain([&self.journal]).flat_map(|journal| &journal.sessions);
+        let Some(newest) = sessions.max_by_key(|session| session.started) else { return Ok(()) };
+        let name = |path: &str| super::run::scene_name(Path::new(path));
+        let scene = newest.sources.first().map(|(path, _)| name(path)).unwrap_or_default();
+        if newest.sweep == loaded.scene.sweep.name && scene == loaded.scene_name {
+            return Ok(());
+        }
+        let message = Diagnostic::error(codes::F126, format!("{} holds another sweep", out.display()))
+            .found(format!("`{}` of {scene}", newest.sweep))
+            .expected(format!("`{}` of {}", loaded.scene.sweep.name, loaded.scene_name))
+            .help("give another folder with `--out`, or remove this one");
+        Err(Stopped::new(Exit::SceneWrong, message))
     }
 }
 
-/// All journals of a folder, in the order of their names.
-pub(crate) fn journals(folder: &Path) -> Result<Vec<Journal>, Stopped> {
+/// Files of journals, in the order of their names.
+fn journal_paths(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder.join("journal")).into_iter().flatten().flatten();
     let mut paths: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
     paths.retain(|path| path.extension().is_some_and(|extension| extension == "journal"));
     paths.sort();
+    paths
+}
+
+/// All journals of a folder, in the order of their names.
+pub(crate) fn journals(folder: &Path) -> Result<Vec<Journal>, Stopped> {
+    let paths = journal_paths(folder);
     let journals: Result<Vec<Journal>, JournalError> = paths.iter().map(|path| Journal::look(path)).collect();
     let journals = journals.map_err(|error| failed(&error))?;
     if journals.iter().all(|journal| journal.sessions.is_empty()) {
@@ -114,7 +140,7 @@ pub(crate) struct GatherArguments {
 pub(crate) fn gather(arguments: &GatherArguments, terminal: &Terminal) -> CommandResult {
     let (journals, loaded) = open(&arguments.folder)?;
     let pool = pool(machine::n_threads())?;
-    let points = pool.install(|| Points::of(&loaded.scene));
+    let points = super::sweep::plan_points(&loaded, &pool)?;
     let journals: Vec<&Journal> = journals.iter().collect();
     pool.install(|| gather_and_tell(&loaded, &points, &journals, &arguments.folder, terminal))
 }
@@ -140,7 +166,12 @@ fn gather_of<'a>(loaded: &'a load::Sweep, points: &'a Points, journals: &'a [&'a
         reports: &loaded.scenario.reports,
         scene_name: &loaded.scene_name,
         version: env!("CARGO_PKG_VERSION"),
+        is_cancelled: &is_interrupted,
     }
+}
+
+fn is_interrupted() -> bool {
+    super::interrupt::Interrupt::listen().is_requested()
 }
 
 /// Writes the tables and says what is in them.
@@ -153,6 +184,7 @@ pub(crate) fn gather_and_tell(
 ) -> CommandResult {
     let gather = gather_of(loaded, points, journals);
     let gathered = gather.write(out).map_err(|error| match &error {
+        GatherError::Interrupted => super::sweep::interrupted(),
         GatherError::Journal(_) | GatherError::Table(_) | GatherError::Description(_) => failed(&error),
     })?;
     manifest::write(out, &gathered.files).map_err(|error| {
@@ -179,6 +211,10 @@ fn summary(gathered: &Gathered, out: &Path, report: &Path) -> String {
     if gathered.n_missing > 0 {
         lines.push(("missing", format!("{} points are not complete", grouped(gathered.n_missing))));
     }
+    if gathered.n_imprecise > 0 {
+        let what = format!("{} points, after all replicates that are allowed", grouped(gathered.n_imprecise));
+        lines.push(("imprecise", what));
+    }
     for expectation in &gathered.expectations {
         let verdict = match expectation.outcome {
             ExpectationOutcome::Met => "met",
@@ -201,6 +237,7 @@ fn json(gathered: &Gathered, out: &Path, report: &Path) -> String {
         "done": gathered.n_done,
         "failed": gathered.n_failed,
         "missing": gathered.n_missing,
+        "imprecise": gathered.n_imprecise,
         "expectations": gathered.expectations,
     });
     format!("{summary}\n")
@@ -216,7 +253,7 @@ pub(crate) struct StatusArguments {
 pub(crate) fn status(arguments: &StatusArguments, terminal: &Terminal) -> CommandResult {
     let (journals, loaded) = open(&arguments.folder)?;
     let pool = pool(machine::n_threads())?;
-    let points = pool.install(|| Points::of(&loaded.scene));
+    let points = super::sweep::plan_points(&loaded, &pool)?;
     let all: Vec<&Journal> = journals.iter().collect();
     let standing = pool.install(|| gather_of(&loaded, &points, &all).standing());
     let standing = standing.map_err(|error| failed(&error))?;

@@ -7,7 +7,7 @@ use super::{CommandResult, Exit, Stopped, Terminal, load, machine};
 use lamella::diagnostic::{Diagnostic, codes};
 use lamella::sweep::journal::Entry;
 use lamella::sweep::why::{Difference, changes, difference};
-use lamella::sweep::{Journal, Points, key_text};
+use lamella::sweep::{Journal, key_text};
 use std::path::{Path, PathBuf};
 
 /// Say why a point of a sweep will run again, or why it will not
@@ -27,7 +27,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
     let Some(session) = newest(&journals) else { return Ok(Exit::SceneWrong) };
     let path = arguments.scene.clone().unwrap_or_else(|| PathBuf::from(&session.sources[0].0));
     let Some(now) = load::load_session_at(session, &path, terminal)? else { return Ok(Exit::SceneWrong) };
-    let points = pool(machine::n_threads())?.install(|| Points::of(&now.scene));
+    let points = super::sweep::plan_points(&now, &pool(machine::n_threads())?)?;
     let point = point_of(&points, arguments.point)?;
     check_replicate(&now, arguments.point)?;
     let name = now.scene.name(point.combination);

@@ -21,8 +21,9 @@ use crate::table::{Gatherer, PointRow, Record, Shape, Status, TableError, Writte
 use rayon::prelude::*;
 use std::path::Path;
 
-/// Points that are read side by side before their rows are written.
-const BATCH: usize = 64;
+/// Most points that are read side by side before their rows are written, and most bytes of theirs.
+const MAX_BATCH: usize = 64;
+const BATCH_BYTES: u64 = 64 << 20;
 
 /// What went into the tables.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,12 +34,20 @@ pub struct Gathered {
     pub n_failed: u64,
     /// Points with replicates that no journal has.
     pub n_missing: u64,
+    /// Points whose mean is less precise than was asked for, after all replicates that are allowed.
+    pub n_imprecise: u64,
     pub expectations: Vec<SweepExpectation>,
 }
 
 impl Gathered {
     pub fn is_met(&self) -> bool {
-        self.expectations.iter().all(|expectation| expectation.outcome != ExpectationOutcome::NotMet)
+        // What a whole sweep cannot tell is not met either.
+        let is_whole = self.n_missing == 0;
+        self.expectations.iter().all(|expectation| match expectation.outcome {
+            ExpectationOutcome::Met => true,
+            ExpectationOutcome::NotMet => false,
+            ExpectationOutcome::Unknown => !is_whole,
+        })
     }
 }
 
@@ -56,6 +65,7 @@ pub enum GatherError {
     Journal(JournalError),
     Table(TableError),
     Description(String),
+    Interrupted,
 }
 
 impl std::fmt::Display for GatherError {
@@ -64,6 +74,7 @@ impl std::fmt::Display for GatherError {
             Self::Journal(error) => error.fmt(f),
             Self::Table(error) => error.fmt(f),
             Self::Description(error) => f.write_str(error),
+            Self::Interrupted => f.write_str("interrupted"),
         }
     }
 }
@@ -93,6 +104,7 @@ pub struct Gather<'a> {
     pub scene_name: &'a str,
     /// Version of the program, for rows of points that never ran.
     pub version: &'a str,
+    pub is_cancelled: &'a (dyn Fn() -> bool + Sync),
 }
 
 /// One point as it goes into the tables.
@@ -101,6 +113,7 @@ struct Whole {
     plan: Option<Plan>,
     replicates: Vec<Replicate>,
     is_missing: bool,
+    is_imprecise: bool,
 }
 
 impl Gather<'_> {
@@ -115,13 +128,18 @@ impl Gather<'_> {
             n_done: 0,
             n_failed: 0,
             n_missing: 0,
+            n_imprecise: 0,
             expectations: Vec::new(),
         };
-        for (batch_idx, batch) in self.points.list.chunks(BATCH).enumerate() {
+        let batch_size = self.batch_size();
+        for (batch_idx, batch) in self.points.list.chunks(batch_size).enumerate() {
+            if (self.is_cancelled)() {
+                return Err(GatherError::Interrupted);
+            }
             let wholes: Vec<Result<Whole, JournalError>> =
                 batch.par_iter().map(|point| self.whole(point)).collect();
             for (idx, (point, whole)) in batch.iter().zip(wholes).enumerate() {
-                let number = (batch_idx * BATCH + idx) as u32;
+                let number = (batch_idx * batch_size + idx) as u32;
                 self.add(number, point, whole?, &mut gatherer, &mut judge, &mut gathered)?;
             }
         }
@@ -191,8 +209,24 @@ impl Gather<'_> {
         Ok(shape)
     }
 
+    /// As many points as fit into the bytes that may be read at once, by the mean of the journals.
+    fn batch_size(&self) -> usize {
+        let bytes: u64 = self.journals.iter().map(|journal| journal.n_bytes()).sum();
+        let records: usize = self.journals.iter().map(|journal| journal.len()).sum();
+        let replicates = &self.scene.sweep.replicates;
+        let most = replicates.until.as_ref().map_or(replicates.least, |until| until.most);
+        let per_point = bytes / records.max(1) as u64 * u64::from(most);
+        (BATCH_BYTES / per_point.max(1)).clamp(1, MAX_BATCH as u64) as usize
+    }
+
     fn whole(&self, point: &Point) -> Result<Whole, JournalError> {
-        let nothing = Whole { scenario: None, plan: None, replicates: Vec::new(), is_missing: false };
+        let nothing = Whole {
+            scenario: None,
+            plan: None,
+            replicates: Vec::new(),
+            is_missing: false,
+            is_imprecise: false,
+        };
         if point.refusal.is_some() {
             return Ok(nothing);
         }
@@ -220,7 +254,9 @@ impl Gather<'_> {
             }
             list.push(replicate);
         }
-        Ok(Whole { scenario: Some(scenario), plan: Some(compiled.plan), replicates: list, is_missing })
+        let is_imprecise = !is_missing && !series.is_precise(replicates);
+        let (scenario, plan) = (Some(scenario), Some(compiled.plan));
+        Ok(Whole { scenario, plan, replicates: list, is_missing, is_imprecise })
     }
 
     fn add(
@@ -233,11 +269,21 @@ impl Gather<'_> {
         gathered: &mut Gathered,
     ) -> Result<(), GatherError> {
         gathered.n_missing += u64::from(whole.is_missing);
+        gathered.n_imprecise += u64::from(whole.is_imprecise);
         if let Some(refusal) = &point.refusal {
             gathered.n_failed += 1;
+            let values = self.scene.values(point.combination);
+            let of = |target: Target| {
+                let own = values.iter().find(|value| *value.target == target);
+                own.and_then(|value| value.value.si.first().copied())
+            };
+            let base = &self.base.plan;
             let row = PointRow {
                 point: number,
                 swept: self.scene.swept(point.combination),
+                particles: of(Target::Particles).map_or(base.particles.count, |n| n as u64),
+                step: of(Target::Step).unwrap_or(base.time.step),
+                duration: base.time.duration,
                 error_code: Some(refusal.code.clone()),
                 error_message: Some(refusal.message.clone()),
                 ..refused_row(self.version)

@@ -190,3 +190,65 @@ fn points_can_be_verified_and_repeated() {
     folder.lamella(&["verify", "alone"]).exits(1).says("[F123]").says("total/part-0000.parquet");
     folder.lamella(&["verify", "nowhere"]).exits(2).says("[F121]");
 }
+
+/// Values that are wrong can be skipped for being wrong; those that are not have rows that say why.
+#[test]
+fn skips_come_before_what_a_scene_refuses() {
+    let folder = Folder::new();
+    let sweep = "  D 1e-3 m^2/s, 5 m^2/s\n  particles 100, 200\n  skip when D > 1 m^2/s and particles > 150";
+    folder.write("s.lam", scene_with(sweep));
+    let done = folder.lamella(&["sweep", "s.lam", "--out", "out"]).exits(1);
+    done.says("3 points, 1 skipped").gives("2 done, 1 failed");
+    let points = lamella::table::read::points(&folder.path("out/points.parquet")).unwrap();
+    let refused = &points[2];
+    assert_eq!((refused.particles, refused.step), (100, 1.0));
+    let message = refused.error_message.as_deref().unwrap();
+    assert!(message.contains("s.lam:21:") && message.contains("found 5"), "{message}");
+    folder.write("none.lam", scene_with("  D 1e-3 m^2/s\n  skip when D > 0 m^2/s"));
+    folder.lamella(&["sweep", "none.lam"]).exits(2).says("[F127]");
+}
+
+#[test]
+fn axes_that_go_together_have_one_order() {
+    let folder = Folder::new();
+    let sweep =
+        "  zip {\n    step 1 s, 2 s, 4 s\n    particles 100, 400, 1600\n  }\n  D 1e-3 m^2/s, 1e-4 m^2/s";
+    folder.write("s.lam", scene_with(&format!("{sweep}\n  expect order(err, step) in 7 .. 8")));
+    folder.lamella(&["sweep", "s.lam", "--out", "a"]).exits(1).gives("NOT MET").gives("over 6 points");
+    // What cannot be told is not met.
+    folder.write("s.lam", scene_with(&format!("{sweep}\n  expect order(leak, step) in 0 .. 1")));
+    let none = folder.lamella(&["sweep", "s.lam", "--out", "b"]).exits(1);
+    none.gives("not known").gives("have no logarithm");
+}
+
+#[test]
+fn a_folder_keeps_its_sweep() {
+    let folder = run_once();
+    folder.write("other.lam", scene_with(SWEEP));
+    folder.lamella(&["sweep", "other.lam", "--out", "out"]).exits(2).says("[F126]").says("`study` of s");
+    let over = |axis: &str| folder.lamella(&["sweep", "s.lam", "--over", axis]).exits(0);
+    over("step=1s,2s").gives("results/s-over-step");
+    over("particles=100,200").gives("results/s-over-particles");
+}
+
+#[test]
+fn what_failed_can_be_run_alone() {
+    let folder = Folder::new();
+    folder.write("s.lam", scene_with("  D linspace(1e-4 m^2/s, 1e-3 m^2/s, 30)"));
+    folder
+        .lamella(&["sweep", "s.lam", "--retry-failed", "--out", "none"])
+        .says("0 replicates run, 30 left alone");
+    let mut command = folder.command(&["sweep", "s.lam", "--out", "out"]);
+    crate::program::finish(command.env("LAMELLA_FAULT_EVERY", "5").output().unwrap()).exits(1);
+    let n_failed = facts(&folder, "out").iter().filter(|row| row.contains("Failed")).count();
+    let again = folder.lamella(&["sweep", "s.lam", "--retry-failed", "--out", "out"]).exits(0);
+    again.says(&format!("{n_failed} replicates run, {} known", 30 - n_failed));
+}
+
+#[test]
+fn a_mean_that_stays_imprecise_is_told() {
+    let folder = Folder::new();
+    let sweep = "  D 1e-3 m^2/s, 1e-4 m^2/s\n  replicates 2 .. 3 until stderr(err) < 0.0001 % of mean(err)";
+    folder.write("s.lam", scene_with(sweep));
+    folder.lamella(&["sweep", "s.lam", "--out", "out"]).exits(0).gives("imprecise   2 points");
+}
