@@ -94,11 +94,19 @@ pub(crate) fn load_sweep(
     settings: &Settings,
     terminal: &Terminal,
 ) -> Result<Option<Sweep>, Stopped> {
+    if let (Some(name), Some(_)) = (name, over) {
+        let text = format!("`{name}` names a sweep of the scene, and `--over` makes another one");
+        let message = Diagnostic::error(codes::F120, text)
+            .help("leave out the name, or write the axes of `--over` into the sweep");
+        return Err(Stopped::new(Exit::SceneWrong, message));
+    }
     let mut sources = Sources::single(display_name(path), read_scene(path)?);
     add_used(&mut sources, path);
     let further: Vec<(&str, String)> = over.map(|over| ("--over", over.statement())).into_iter().collect();
     let name = if over.is_some() { Some("command_line") } else { name };
-    pick(sources, &further, name, settings, (display_name(path), scene_name(path)), Some(terminal))
+    let names = (display_name(path), scene_name(path));
+    let loaded = pick(sources, &further, name, settings, names, Some(terminal))?;
+    loaded.map(Sweep::without_swept_settings).transpose()
 }
 
 /// The sweep of a session of a journal.
@@ -140,7 +148,8 @@ fn pick(
     (path, scene_name): (String, String),
     terminal: Option<&Terminal>,
 ) -> Result<Option<Sweep>, Stopped> {
-    let options = Options { passes: Selection::All, memory: machine::available_memory() };
+    // What fits into memory is a matter of the machine that runs a point, and never of its tables.
+    let options = Options { passes: Selection::All, memory: None };
     let settings = &Settings { sweep: name.map(str::to_owned), ..settings.clone() };
     let mut checked = lamella::check_with(sources, further, settings, &options);
     if let Some(terminal) = terminal {
@@ -188,8 +197,25 @@ fn no_sweep(file: &tree::File, name: Option<&str>) -> Stopped {
 }
 
 impl Sweep {
+    /// Refuses `--set` of what an axis sets: it would have no effect.
+    fn without_swept_settings(self) -> Result<Self, Stopped> {
+        let axes: Vec<&str> =
+            self.scene.sweep.groups.iter().flatten().map(|axis| axis.target.name()).collect();
+        let set = &self.scene.settings.set;
+        let Some((name, value)) = set.iter().find(|(name, _)| axes.contains(&name.trim())) else {
+            return Ok(self);
+        };
+        let (name, sweep) = (name.trim(), &self.scene.sweep.name);
+        let text = format!("`--set` gives `{name}` one value, and the sweep `{sweep}` gives it many");
+        let message = Diagnostic::error(codes::W002, text)
+            .found(format!("--set {name}={value}"))
+            .expected(format!("`{name}` as an axis or as a setting"))
+            .help(format!("leave out `--set {name}=…`, or take the axis out of the sweep"));
+        Err(Stopped::new(Exit::SceneWrong, message))
+    }
+
     /// What a journal remembers of this start.
-    pub(crate) fn session(&self, started: i64, facts: Vec<(String, String)>) -> Session {
+    pub(crate) fn session(&self, started: i64) -> Session {
         let texts = self.scene.sources.files().filter(|(_, file)| file.name != "--set");
         Session {
             sources: texts.map(|(_, file)| (file.name.clone(), file.text.clone())).collect(),
@@ -198,7 +224,7 @@ impl Sweep {
             sweep: self.scene.sweep.name.clone(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             started,
-            facts,
+            facts: vec![("host".to_owned(), machine::host())],
         }
     }
 

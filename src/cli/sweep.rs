@@ -4,12 +4,12 @@ use super::interrupt::Interrupt;
 use super::run::scene_name;
 use super::sweep_folder::{Folder, Shard, gather_and_tell};
 use super::text::{duration, grouped};
-use super::{CommandResult, Exit, Stopped, Terminal, facts, load, machine};
+use super::{CommandResult, Exit, Stopped, Terminal, load, machine};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lamella::diagnostic::{Diagnostic, codes};
 use lamella::sweep::frame::Replicate;
-use lamella::sweep::run::{Ending, Settings as RunSettings, Surroundings, Tally, Watch};
-use lamella::sweep::{Points, run as run_sweep};
+use lamella::sweep::run::{Ending, Settings as RunSettings, Store, Surroundings, Tally, Watch};
+use lamella::sweep::{Journal, Points, run as run_sweep};
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -64,16 +64,29 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
         load::load_sweep(&arguments.file, arguments.name.as_deref(), over.as_ref(), &settings, terminal)?;
     let Some(loaded) = loaded else { return Ok(Exit::SceneWrong) };
     let out = arguments.out.clone().unwrap_or_else(|| {
-        let name = format!("{}-{}", scene_name(&arguments.file), loaded.scene.sweep.name);
+        let sweep = &loaded.scene.sweep;
+        let name = match arguments.over.is_empty() {
+            true => format!("{}-{}", scene_name(&arguments.file), sweep.name),
+            // Axes of the command line have no name of their own.
+            false => {
+                let axes = sweep.groups.iter().flatten().map(|axis| axis.target.name());
+                let axes: Vec<&str> = axes.collect();
+                format!("{}-over-{}", scene_name(&arguments.file), axes.join("-"))
+            }
+        };
         Path::new("results").join(name)
     });
     let threads = arguments.threads.map_or_else(machine::n_threads, usize::from);
     let pool = pool(threads)?;
-    let points = pool.install(|| Points::of(&loaded.scene));
+    let points = plan_points(&loaded, &pool)?;
+    if points.is_empty() {
+        return Err(nothing_to_run(&points));
+    }
     let shard = arguments.shard.unwrap_or_default();
     let mut folder = Folder::open(&out, shard)?;
-    let session = loaded.session(machine::now(), facts::facts(Some(&arguments.file), threads));
-    let session = folder.journal.add_session(session).map_err(|error| failed(&error))?;
+    folder.must_hold(&loaded, &out)?;
+    let session =
+        folder.journal.add_session(loaded.session(machine::now())).map_err(|error| failed(&error))?;
     announce(&points, &folder, terminal);
     let watch = Progress::new(terminal, &interrupt, &out, &loaded, &points);
     let journal = Mutex::new(folder.journal);
@@ -85,7 +98,8 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
         shard: (shard.number, shard.of),
     };
     let around = surroundings();
-    let ended = run_sweep::run(&loaded.scene, &points, &journal, session, &settings, &around, &watch);
+    let store = Store { journal: &journal, others: &folder.others };
+    let ended = run_sweep::run(&loaded.scene, &points, &store, session, &settings, &around, &watch);
     watch.finish();
     let (ending, tally) = ended.map_err(|error| failed(&error))?;
     folder.journal = journal.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
@@ -93,9 +107,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
     tell(&tally, &ending, &out, terminal);
     match ending {
         Ending::Interrupted => {
-            let message = Diagnostic::error(codes::R101, "the sweep was interrupted")
-                .note("what was complete is kept: the same command goes on from there");
-            return Err(Stopped::new(Exit::Interrupted, message));
+            return Err(interrupted());
         }
         Ending::Failed => return Ok(Exit::Failed),
         Ending::Complete => {}
@@ -105,7 +117,8 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
             .remark(&format!("this was shard {shard}; `lamella gather {}` makes the tables", out.display()));
         return Ok(if tally.n_failed > 0 { Exit::Failed } else { Exit::Done });
     }
-    pool.install(|| gather_and_tell(&loaded, &points, &[&folder.journal], &out, terminal))
+    let journals: Vec<&Journal> = std::iter::once(&folder.journal).chain(&folder.others).collect();
+    pool.install(|| gather_and_tell(&loaded, &points, &journals, &out, terminal))
 }
 
 pub(crate) fn pool(threads: usize) -> Result<rayon::ThreadPool, Stopped> {
@@ -113,6 +126,26 @@ pub(crate) fn pool(threads: usize) -> Result<rayon::ThreadPool, Stopped> {
         .num_threads(threads)
         .build()
         .map_err(|error| Stopped::new(Exit::Failed, Diagnostic::error(codes::R103, error.to_string())))
+}
+
+/// All points of a sweep, unless somebody does not want to wait for them.
+pub(crate) fn plan_points(loaded: &load::Sweep, pool: &rayon::ThreadPool) -> Result<Points, Stopped> {
+    let interrupt = Interrupt::listen();
+    pool.install(|| Points::of(&loaded.scene, &|| interrupt.is_requested())).ok_or_else(interrupted)
+}
+
+pub(crate) fn interrupted() -> Stopped {
+    let message = Diagnostic::error(codes::R101, "the sweep was interrupted")
+        .note("what was complete is kept: the same command goes on from there");
+    Stopped::new(Exit::Interrupted, message)
+}
+
+fn nothing_to_run(points: &Points) -> Stopped {
+    let n = points.n_skipped;
+    let message = Diagnostic::error(codes::F127, "the sweep has no point")
+        .found(format!("{n} combinations, all of them skipped"))
+        .expected("one or more points for which no `skip` holds");
+    Stopped::new(Exit::SceneWrong, message)
 }
 
 pub(crate) fn failed(error: &dyn std::fmt::Display) -> Stopped {
@@ -130,17 +163,12 @@ pub(crate) fn surroundings() -> Surroundings {
 }
 
 fn announce(points: &Points, folder: &Folder, terminal: &Terminal) {
-    let (n_done, n_failed) = folder.journal.counts();
+    let n_known: usize = folder.others.iter().map(Journal::len).sum::<usize>() + folder.journal.len();
     let skipped =
         if points.n_skipped > 0 { format!(", {} skipped", grouped(points.n_skipped)) } else { String::new() };
-    let known = match (n_done, n_failed) {
-        (0, 0) => String::new(),
-        (done, 0) => format!("; {} replicates are there already", grouped(done as u64)),
-        (done, bad) => format!(
-            "; {} replicates are there already, {} failed and run again",
-            grouped(done as u64),
-            grouped(bad as u64)
-        ),
+    let known = match n_known {
+        0 => String::new(),
+        n => format!("; {} replicates are recorded already", grouped(n as u64)),
     };
     terminal.remark(&format!("{} points{skipped}{known}", grouped(points.len() as u64)));
     for (from, to) in &folder.journal.damaged {
@@ -171,12 +199,14 @@ fn tell(tally: &Tally, ending: &Ending, out: &Path, terminal: &Terminal) {
     let run = format!("{} replicates run", grouped(tally.n_done));
     let reused =
         if tally.n_reused > 0 { format!(", {} known", grouped(tally.n_reused)) } else { String::new() };
+    let left =
+        if tally.n_left > 0 { format!(", {} left alone", grouped(tally.n_left)) } else { String::new() };
     let bad = match tally.n_failed {
         0 => String::new(),
         n => format!(", {} failed: see {}", grouped(n), out.join("failed").display()),
     };
     let end = if matches!(ending, Ending::Failed) { "; stopped at the first failure" } else { "" };
-    terminal.remark(&format!("{run}{reused}{bad}{end}"));
+    terminal.remark(&format!("{run}{reused}{left}{bad}{end}"));
 }
 
 const BAR_PERIOD: Duration = Duration::from_millis(100);
@@ -265,7 +295,7 @@ impl Watch for Progress<'_> {
 }
 
 fn state(tally: &Tally, elapsed: f64) -> String {
-    let n_ended = tally.n_done + tally.n_failed + tally.n_reused;
+    let n_ended = tally.n_done + tally.n_failed + tally.n_reused + tally.n_left;
     let bad =
         if tally.n_failed > 0 { format!(", {} failed", grouped(tally.n_failed)) } else { String::new() };
     let left = if tally.cost_done > 0.0 {

@@ -1,11 +1,10 @@
 //! The folder of a sweep: its journals, `gather` and `status`.
 
-use super::files::write_whole;
 use super::sweep::{failed, pool};
 use super::text::grouped;
 use super::{CommandResult, Exit, Stopped, Terminal, load, machine};
 use lamella::diagnostic::{Diagnostic, codes};
-use lamella::report::{CRATE_FILE, ExpectationOutcome, Provenance, Start};
+use lamella::report::ExpectationOutcome;
 use lamella::sweep::frame::Session;
 use lamella::sweep::gather::{Gather, GatherError, Gathered};
 use lamella::sweep::{Journal, JournalError, Points, manifest};
@@ -74,22 +73,48 @@ pub(crate) fn point_of(points: &Points, which: Which) -> Result<&lamella::sweep:
 /// An open folder.
 pub(crate) struct Folder {
     pub(crate) journal: Journal,
+    /// Of other shards: what they have need not run.
+    pub(crate) others: Vec<Journal>,
 }
 
 impl Folder {
     pub(crate) fn open(out: &Path, shard: Shard) -> Result<Self, Stopped> {
         let name = format!("shard-{:04}-of-{:04}.journal", shard.number, shard.of);
-        let journal = Journal::open(&out.join("journal").join(name)).map_err(|error| failed(&error))?;
-        Ok(Self { journal })
+        let journal = Journal::open(&out.join("journal").join(&name)).map_err(|error| failed(&error))?;
+        let paths = journal_paths(out).into_iter().filter(|path| path.file_name() != Some(name.as_ref()));
+        let others: Result<Vec<Journal>, JournalError> = paths.map(|path| Journal::look(&path)).collect();
+        Ok(Self { journal, others: others.map_err(|error| failed(&error))? })
+    }
+
+    /// Refuses a folder that holds another sweep: its tables would be lost.
+    pub(crate) fn must_hold(&self, loaded: &load::Sweep, out: &Path) -> Result<(), Stopped> {
+        let sessions = self.others.iter().chain([&self.journal]).flat_map(|journal| &journal.sessions);
+        let Some(newest) = sessions.max_by_key(|session| session.started) else { return Ok(()) };
+        let name = |path: &str| super::run::scene_name(Path::new(path));
+        let scene = newest.sources.first().map(|(path, _)| name(path)).unwrap_or_default();
+        if newest.sweep == loaded.scene.sweep.name && scene == loaded.scene_name {
+            return Ok(());
+        }
+        let message = Diagnostic::error(codes::F126, format!("{} holds another sweep", out.display()))
+            .found(format!("`{}` of {scene}", newest.sweep))
+            .expected(format!("`{}` of {}", loaded.scene.sweep.name, loaded.scene_name))
+            .help("give another folder with `--out`, or remove this one");
+        Err(Stopped::new(Exit::SceneWrong, message))
     }
 }
 
-/// All journals of a folder, in the order of their names.
-pub(crate) fn journals(folder: &Path) -> Result<Vec<Journal>, Stopped> {
+/// Files of journals, in the order of their names.
+fn journal_paths(folder: &Path) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(folder.join("journal")).into_iter().flatten().flatten();
     let mut paths: Vec<PathBuf> = entries.map(|entry| entry.path()).collect();
     paths.retain(|path| path.extension().is_some_and(|extension| extension == "journal"));
     paths.sort();
+    paths
+}
+
+/// All journals of a folder, in the order of their names.
+pub(crate) fn journals(folder: &Path) -> Result<Vec<Journal>, Stopped> {
+    let paths = journal_paths(folder);
     let journals: Result<Vec<Journal>, JournalError> = paths.iter().map(|path| Journal::look(path)).collect();
     let journals = journals.map_err(|error| failed(&error))?;
     if journals.iter().all(|journal| journal.sessions.is_empty()) {
@@ -115,7 +140,7 @@ pub(crate) struct GatherArguments {
 pub(crate) fn gather(arguments: &GatherArguments, terminal: &Terminal) -> CommandResult {
     let (journals, loaded) = open(&arguments.folder)?;
     let pool = pool(machine::n_threads())?;
-    let points = pool.install(|| Points::of(&loaded.scene));
+    let points = super::sweep::plan_points(&loaded, &pool)?;
     let journals: Vec<&Journal> = journals.iter().collect();
     pool.install(|| gather_and_tell(&loaded, &points, &journals, &arguments.folder, terminal))
 }
@@ -141,7 +166,12 @@ fn gather_of<'a>(loaded: &'a load::Sweep, points: &'a Points, journals: &'a [&'a
         reports: &loaded.scenario.reports,
         scene_name: &loaded.scene_name,
         version: env!("CARGO_PKG_VERSION"),
+        is_cancelled: &is_interrupted,
     }
+}
+
+fn is_interrupted() -> bool {
+    super::interrupt::Interrupt::listen().is_requested()
 }
 
 /// Writes the tables and says what is in them.
@@ -154,12 +184,12 @@ pub(crate) fn gather_and_tell(
 ) -> CommandResult {
     let gather = gather_of(loaded, points, journals);
     let gathered = gather.write(out).map_err(|error| match &error {
+        GatherError::Interrupted => super::sweep::interrupted(),
         GatherError::Journal(_) | GatherError::Table(_) | GatherError::Description(_) => failed(&error),
     })?;
     manifest::write(out, &gathered.files).map_err(|error| {
         failed(&format!("cannot write {}: {error}", out.join(manifest::MANIFEST).display()))
     })?;
-    write_crate(loaded, journals, &gathered, out)?;
     let report = super::report::write(out)?;
     if !terminal.is_quiet() {
         let text = if terminal.is_json() {
@@ -173,51 +203,6 @@ pub(crate) fn gather_and_tell(
     Ok(if is_well { Exit::Done } else { Exit::Failed })
 }
 
-/// Tells where the tables come from, by the sessions that ran what stands in them.
-fn write_crate(
-    loaded: &load::Sweep,
-    journals: &[&Journal],
-    gathered: &Gathered,
-    out: &Path,
-) -> Result<(), Stopped> {
-    let session = |(journal, number): &(usize, u32)| journals.get(*journal)?.sessions.get(*number as usize);
-    let mut sessions: Vec<&Session> = gathered.sessions.iter().filter_map(session).collect();
-    if sessions.is_empty() {
-        // All points were refused before they ran.
-        sessions.extend(journals.iter().flat_map(|journal| &journal.sessions));
-    }
-    let start = |session: &Session| Start {
-        version: session.version.clone(),
-        started: session.started,
-        facts: session.facts.clone(),
-    };
-    let starts = Start::merged(sessions.into_iter().map(start).collect());
-    let missing = match (gathered.n_failed, gathered.n_missing) {
-        (0, 0) => None,
-        (failed, 0) => Some(format!("{failed} replicates or points failed")),
-        (failed, missing) => Some(format!("{failed} replicates or points failed, {missing} are missing")),
-    };
-    let files = gathered.files.iter().map(|file| file.name.clone());
-    let provenance = Provenance {
-        scene_name: &loaded.scene_name,
-        title: loaded.record.title.as_deref(),
-        citations: &loaded.record.citations,
-        plan_hash: &loaded.record.plan_hash,
-        sweep: Some(&gathered.description),
-        settings: &loaded.scene.settings.set,
-        seed: loaded.scene.root_seed(),
-        starts: &starts,
-        started: gathered.started,
-        finished: gathered.finished,
-        failure: missing,
-        files: files
-            .chain([manifest::MANIFEST, "report.html", "report/", "journal/"].map(str::to_owned))
-            .collect(),
-    };
-    let text = provenance.to_json().map_err(|reason| failed(&reason))?;
-    write_whole(&out.join(CRATE_FILE), &text)
-}
-
 fn summary(gathered: &Gathered, out: &Path, report: &Path) -> String {
     let mut lines = vec![
         ("points", grouped(gathered.n_points)),
@@ -226,7 +211,11 @@ fn summary(gathered: &Gathered, out: &Path, report: &Path) -> String {
     if gathered.n_missing > 0 {
         lines.push(("missing", format!("{} points are not complete", grouped(gathered.n_missing))));
     }
-    for expectation in &gathered.description.expectations {
+    if gathered.n_imprecise > 0 {
+        let what = format!("{} points, after all replicates that are allowed", grouped(gathered.n_imprecise));
+        lines.push(("imprecise", what));
+    }
+    for expectation in &gathered.expectations {
         let verdict = match expectation.outcome {
             ExpectationOutcome::Met => "met",
             ExpectationOutcome::NotMet => "NOT MET",
@@ -248,7 +237,8 @@ fn json(gathered: &Gathered, out: &Path, report: &Path) -> String {
         "done": gathered.n_done,
         "failed": gathered.n_failed,
         "missing": gathered.n_missing,
-        "expectations": gathered.description.expectations,
+        "imprecise": gathered.n_imprecise,
+        "expectations": gathered.expectations,
     });
     format!("{summary}\n")
 }
@@ -263,7 +253,7 @@ pub(crate) struct StatusArguments {
 pub(crate) fn status(arguments: &StatusArguments, terminal: &Terminal) -> CommandResult {
     let (journals, loaded) = open(&arguments.folder)?;
     let pool = pool(machine::n_threads())?;
-    let points = pool.install(|| Points::of(&loaded.scene));
+    let points = super::sweep::plan_points(&loaded, &pool)?;
     let all: Vec<&Journal> = journals.iter().collect();
     let standing = pool.install(|| gather_of(&loaded, &points, &all).standing());
     let standing = standing.map_err(|error| failed(&error))?;

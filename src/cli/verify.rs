@@ -4,7 +4,7 @@ use super::interrupt::Interrupt;
 use super::sweep::{failed, pool, surroundings};
 use super::sweep_folder::{Which, open, point_of};
 use super::text::grouped;
-use super::why::is_sweep;
+use super::why::{check_replicate, is_sweep};
 use super::{CommandResult, Exit, Stopped, Terminal, load, machine, run as run_command};
 use lamella::diagnostic::{Diagnostic, codes};
 use lamella::engine::Control;
@@ -48,7 +48,7 @@ impl Control for Ask<'_> {
 fn verify_sweep(folder: &Path, sample: Option<usize>, threads: usize, terminal: &Terminal) -> CommandResult {
     let interrupt = Interrupt::listen();
     let (journals, loaded) = open(folder)?;
-    let points = pool(threads)?.install(|| Points::of(&loaded.scene));
+    let points = super::sweep::plan_points(&loaded, &pool(threads)?)?;
     let n = sample.unwrap_or(points.len()).clamp(1, points.len().max(1));
     let (mut n_same, mut different) = (0_u64, Vec::new());
     for idx in 0..n.min(points.len()) {
@@ -104,6 +104,7 @@ fn compare(
             replicate,
             session: 0,
             compile_wall: 0.0,
+            memory: None,
         };
         let Some(again) = task.run(&Ask(interrupt), threads.max(2), &around) else {
             let message = Diagnostic::error(codes::R101, "the comparison was interrupted");
@@ -203,8 +204,9 @@ pub(crate) struct ReproArguments {
 pub(crate) fn repro(arguments: &ReproArguments, terminal: &Terminal) -> CommandResult {
     let threads = arguments.threads.map_or_else(machine::n_threads, usize::from);
     let (_, loaded) = open(&arguments.folder)?;
-    let points = pool(threads)?.install(|| Points::of(&loaded.scene));
+    let points = super::sweep::plan_points(&loaded, &pool(threads)?)?;
     let point = point_of(&points, arguments.point)?;
+    check_replicate(&loaded, arguments.point)?;
     let Which { point: number, replicate } = arguments.point;
     let seed = loaded.scene.seed(point.combination, replicate);
     let out = arguments

@@ -7,7 +7,7 @@ use super::{CommandResult, Exit, Stopped, Terminal, load, machine};
 use lamella::diagnostic::{Diagnostic, codes};
 use lamella::sweep::journal::Entry;
 use lamella::sweep::why::{Difference, changes, difference};
-use lamella::sweep::{Journal, Points, key_text};
+use lamella::sweep::{Journal, key_text};
 use std::path::{Path, PathBuf};
 
 /// Say why a point of a sweep will run again, or why it will not
@@ -27,8 +27,9 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
     let Some(session) = newest(&journals) else { return Ok(Exit::SceneWrong) };
     let path = arguments.scene.clone().unwrap_or_else(|| PathBuf::from(&session.sources[0].0));
     let Some(now) = load::load_session_at(session, &path, terminal)? else { return Ok(Exit::SceneWrong) };
-    let points = pool(machine::n_threads())?.install(|| Points::of(&now.scene));
+    let points = super::sweep::plan_points(&now, &pool(machine::n_threads())?)?;
     let point = point_of(&points, arguments.point)?;
+    check_replicate(&now, arguments.point)?;
     let name = now.scene.name(point.combination);
     let Which { point: number, replicate } = arguments.point;
     let (_, compiled) =
@@ -49,6 +50,19 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
     let exit = head.tell(true, &reason, terminal)?;
     show(&old, &now, &found, terminal);
     Ok(exit)
+}
+
+/// Refuses a replicate that the sweep never runs.
+pub(crate) fn check_replicate(loaded: &load::Sweep, which: Which) -> Result<(), Stopped> {
+    let replicates = &loaded.scene.sweep.replicates;
+    let most = replicates.until.as_ref().map_or(replicates.least, |until| until.most);
+    if which.replicate < most {
+        return Ok(());
+    }
+    let Which { point, replicate } = which;
+    let expected = if most == 1 { "0".to_owned() } else { format!("0 to {}", most - 1) };
+    let message = Diagnostic::error(codes::F122, format!("point {point} has no replicate {replicate}"));
+    Err(Stopped::new(Exit::SceneWrong, message.found(replicate.to_string()).expected(expected)))
 }
 
 /// What is asked about.

@@ -64,6 +64,8 @@ codes! {
     F122 "there is no such point",
     F123 "a result is not the same again",
     F124 "what will run again, and why",
+    F126 "a folder holds another sweep",
+    F127 "a sweep has no point",
     R101 "the run was interrupted",
     R102 "a value of the run is no longer right",
     R103 "the machine cannot give what the run needs",

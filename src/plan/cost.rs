@@ -40,6 +40,13 @@ pub struct Cost {
     pub cpu_seconds: f64,
 }
 
+impl Cost {
+    /// Bytes that the run needs at once.
+    pub fn bytes(&self) -> u64 {
+        self.state_bytes.saturating_add(self.bin_bytes).saturating_add(self.output_bytes)
+    }
+}
+
 /// Values that every particle stores for each component.
 pub fn n_stored_values(plan: &Plan) -> usize {
     match &plan.mixing {

@@ -386,7 +386,7 @@ fn check_memory(
     diagnostics: &mut Vec<Diagnostic>,
 ) {
     let Some(available) = memory else { return };
-    let needed = cost.state_bytes.saturating_add(cost.bin_bytes).saturating_add(cost.output_bytes);
+    let needed = cost.bytes();
     if needed <= available {
         return;
     }

@@ -174,8 +174,16 @@ impl Verdict<'_> {
                 (&line[..], ln(*axis), ln(mean(values)))
             })
             .collect();
+        let n_without = points.len() - logs.len();
         let Some((slope, error)) = slope(&logs) else {
-            return (ExpectationOutcome::Unknown, "fewer than two points on a line".to_owned());
+            let why = match n_without {
+                0 => "fewer than two points on a line".to_owned(),
+                n => format!(
+                    "{n} of {} points have no logarithm: a mean or a value is not above zero",
+                    points.len()
+                ),
+            };
+            return (ExpectationOutcome::Unknown, why);
         };
         let detail = match error {
             Some(error) => format!("{slope:.3} ± {error:.3} (standard error) over {} points", logs.len()),
@@ -222,13 +230,17 @@ fn slope(points: &[(&[u64], f64, f64)]) -> Option<(f64, Option<f64>)> {
     Some((slope, error))
 }
 
-/// The value of an axis at a combination, and the values of all others as bits.
+/// The value of an axis at a combination, and the values of the axes that are varied apart from it, as
+/// bits: those zipped with it change with it.
 fn place(scene: &Scene, combination: u64, axis: &Target) -> (f64, Vec<u64>) {
+    let own_group = scene.sweep.groups.iter().find(|group| group.iter().any(|other| other.target == *axis));
+    let goes_along =
+        |target: &Target| own_group.is_some_and(|group| group.iter().any(|other| other.target == *target));
     let (mut own, mut line) = (f64::NAN, Vec::new());
     for value in scene.values(combination) {
         if value.target == axis {
             own = value.value.si.iter().product();
-        } else {
+        } else if !goes_along(value.target) {
             line.extend(value.value.si.iter().map(|si| si.to_bits()));
         }
     }

@@ -12,18 +12,18 @@ use super::{Journal, JournalError, Scene};
 use crate::plan::Plan;
 use crate::plan::compile::Compiled;
 use crate::report::{
-    ExpectationOutcome, SWEEP_FILE, SWEEP_VERSION, SweepAxis, SweepDescription, SweepReplicates, SweepReport,
-    SweepReportKind,
+    ExpectationOutcome, SWEEP_FILE, SWEEP_VERSION, SweepAxis, SweepDescription, SweepExpectation,
+    SweepReplicates, SweepReport, SweepReportKind,
 };
 use crate::scenario::Scenario;
 use crate::scenario::sweep::{Report, ReportKind, Target};
 use crate::table::{Gatherer, PointRow, Record, Shape, Status, TableError, WrittenFile, si_text};
 use rayon::prelude::*;
-use std::collections::BTreeSet;
 use std::path::Path;
 
-/// Points that are read side by side before their rows are written.
-const BATCH: usize = 64;
+/// Most points that are read side by side before their rows are written, and most bytes of theirs.
+const MAX_BATCH: usize = 64;
+const BATCH_BYTES: u64 = 64 << 20;
 
 /// What went into the tables.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,21 +34,20 @@ pub struct Gathered {
     pub n_failed: u64,
     /// Points with replicates that no journal has.
     pub n_missing: u64,
-    /// What stands in `sweep.json`.
-    pub description: SweepDescription,
-    /// Number of the journal and of the session in it, of each session that ran a replicate of the tables.
-    pub sessions: BTreeSet<(usize, u32)>,
-    /// Of the replicates, microseconds since 1970, UTC.
-    pub started: Option<i64>,
-    pub finished: Option<i64>,
+    /// Points whose mean is less precise than was asked for, after all replicates that are allowed.
+    pub n_imprecise: u64,
+    pub expectations: Vec<SweepExpectation>,
 }
 
 impl Gathered {
     pub fn is_met(&self) -> bool {
-        self.description
-            .expectations
-            .iter()
-            .all(|expectation| expectation.outcome != ExpectationOutcome::NotMet)
+        // What a whole sweep cannot tell is not met either.
+        let is_whole = self.n_missing == 0;
+        self.expectations.iter().all(|expectation| match expectation.outcome {
+            ExpectationOutcome::Met => true,
+            ExpectationOutcome::NotMet => false,
+            ExpectationOutcome::Unknown => !is_whole,
+        })
     }
 }
 
@@ -66,6 +65,7 @@ pub enum GatherError {
     Journal(JournalError),
     Table(TableError),
     Description(String),
+    Interrupted,
 }
 
 impl std::fmt::Display for GatherError {
@@ -74,6 +74,7 @@ impl std::fmt::Display for GatherError {
             Self::Journal(error) => error.fmt(f),
             Self::Table(error) => error.fmt(f),
             Self::Description(error) => f.write_str(error),
+            Self::Interrupted => f.write_str("interrupted"),
         }
     }
 }
@@ -103,6 +104,7 @@ pub struct Gather<'a> {
     pub scene_name: &'a str,
     /// Version of the program, for rows of points that never ran.
     pub version: &'a str,
+    pub is_cancelled: &'a (dyn Fn() -> bool + Sync),
 }
 
 /// One point as it goes into the tables.
@@ -110,9 +112,8 @@ struct Whole {
     scenario: Option<Scenario>,
     plan: Option<Plan>,
     replicates: Vec<Replicate>,
-    /// See [`Gathered::sessions`].
-    sessions: BTreeSet<(usize, u32)>,
     is_missing: bool,
+    is_imprecise: bool,
 }
 
 impl Gather<'_> {
@@ -127,22 +128,25 @@ impl Gather<'_> {
             n_done: 0,
             n_failed: 0,
             n_missing: 0,
-            description: self.description(&shape),
-            sessions: BTreeSet::new(),
-            started: None,
-            finished: None,
+            n_imprecise: 0,
+            expectations: Vec::new(),
         };
-        for (batch_idx, batch) in self.points.list.chunks(BATCH).enumerate() {
+        let batch_size = self.batch_size();
+        for (batch_idx, batch) in self.points.list.chunks(batch_size).enumerate() {
+            if (self.is_cancelled)() {
+                return Err(GatherError::Interrupted);
+            }
             let wholes: Vec<Result<Whole, JournalError>> =
                 batch.par_iter().map(|point| self.whole(point)).collect();
             for (idx, (point, whole)) in batch.iter().zip(wholes).enumerate() {
-                let number = (batch_idx * BATCH + idx) as u32;
+                let number = (batch_idx * batch_size + idx) as u32;
                 self.add(number, point, whole?, &mut gatherer, &mut judge, &mut gathered)?;
             }
         }
         let is_whole = gathered.n_missing == 0;
-        gathered.description.expectations = judge.judge(is_whole);
-        let description = gathered.description.to_json().map_err(GatherError::Description)?;
+        gathered.expectations = judge.judge(is_whole);
+        let description = self.description(&gathered.expectations, &shape);
+        let description = description.to_json().map_err(GatherError::Description)?;
         gathered.files = gatherer.finish(&[(SWEEP_FILE, &description)])?.files;
         Ok(gathered)
     }
@@ -205,14 +209,23 @@ impl Gather<'_> {
         Ok(shape)
     }
 
+    /// As many points as fit into the bytes that may be read at once, by the mean of the journals.
+    fn batch_size(&self) -> usize {
+        let bytes: u64 = self.journals.iter().map(|journal| journal.n_bytes()).sum();
+        let records: usize = self.journals.iter().map(|journal| journal.len()).sum();
+        let replicates = &self.scene.sweep.replicates;
+        let most = replicates.until.as_ref().map_or(replicates.least, |until| until.most);
+        let per_point = bytes / records.max(1) as u64 * u64::from(most);
+        (BATCH_BYTES / per_point.max(1)).clamp(1, MAX_BATCH as u64) as usize
+    }
+
     fn whole(&self, point: &Point) -> Result<Whole, JournalError> {
-        let mut sessions = BTreeSet::new();
         let nothing = Whole {
             scenario: None,
             plan: None,
             replicates: Vec::new(),
-            sessions: BTreeSet::new(),
             is_missing: false,
+            is_imprecise: false,
         };
         if point.refusal.is_some() {
             return Ok(nothing);
@@ -228,14 +241,12 @@ impl Gather<'_> {
             }
             let (_, key) = self.scene.replicate(&compiled.plan, point.combination, number);
             // One that ended well comes before one that failed in another shard's journal.
-            let found = self.journals.iter().enumerate();
-            let found = found.filter_map(|(idx, journal)| Some((idx, journal.entry(&key)?)));
-            let Some((idx, entry)) = found.min_by_key(|(_, entry)| entry.status != Status::Done) else {
+            let found = self.journals.iter().filter_map(|journal| Some((*journal, journal.entry(&key)?)));
+            let Some((journal, entry)) = found.min_by_key(|(_, entry)| entry.status != Status::Done) else {
                 is_missing = true;
                 break;
             };
-            let mut replicate = self.journals[idx].replicate(entry)?;
-            sessions.insert((idx, entry.session));
+            let mut replicate = journal.replicate(entry)?;
             refresh(&mut replicate, &scenario, &compiled);
             if let Some(until) = &replicates.until {
                 let value = replicate.row.values.iter().find(|value| value.name == until.measure);
@@ -243,8 +254,9 @@ impl Gather<'_> {
             }
             list.push(replicate);
         }
-        let plan = Some(compiled.plan);
-        Ok(Whole { scenario: Some(scenario), plan, replicates: list, sessions, is_missing })
+        let is_imprecise = !is_missing && !series.is_precise(replicates);
+        let (scenario, plan) = (Some(scenario), Some(compiled.plan));
+        Ok(Whole { scenario, plan, replicates: list, is_missing, is_imprecise })
     }
 
     fn add(
@@ -257,11 +269,21 @@ impl Gather<'_> {
         gathered: &mut Gathered,
     ) -> Result<(), GatherError> {
         gathered.n_missing += u64::from(whole.is_missing);
+        gathered.n_imprecise += u64::from(whole.is_imprecise);
         if let Some(refusal) = &point.refusal {
             gathered.n_failed += 1;
+            let values = self.scene.values(point.combination);
+            let of = |target: Target| {
+                let own = values.iter().find(|value| *value.target == target);
+                own.and_then(|value| value.value.si.first().copied())
+            };
+            let base = &self.base.plan;
             let row = PointRow {
                 point: number,
                 swept: self.scene.swept(point.combination),
+                particles: of(Target::Particles).map_or(base.particles.count, |n| n as u64),
+                step: of(Target::Step).unwrap_or(base.time.step),
+                duration: base.time.duration,
                 error_code: Some(refusal.code.clone()),
                 error_message: Some(refusal.message.clone()),
                 ..refused_row(self.version)
@@ -269,11 +291,7 @@ impl Gather<'_> {
             return Ok(gatherer.add(&self.base.plan, row, &[], Vec::new())?);
         }
         let (Some(scenario), Some(plan)) = (&whole.scenario, &whole.plan) else { return Ok(()) };
-        gathered.sessions.extend(&whole.sessions);
         for (idx, mut replicate) in whole.replicates.into_iter().enumerate() {
-            let (started, finished) = (replicate.row.started, replicate.row.finished);
-            gathered.started = Some(gathered.started.map_or(started, |first| first.min(started)));
-            gathered.finished = gathered.finished.max(Some(finished));
             let place = (number, idx as u32);
             (replicate.row.point, replicate.row.replicate) = place;
             // A renamed axis is another column, whatever it was called when the point ran.
@@ -292,8 +310,7 @@ impl Gather<'_> {
         Ok(())
     }
 
-    /// Expectations are judged when all points are in.
-    fn description(&self, shape: &Shape) -> SweepDescription {
+    fn description(&self, expectations: &[SweepExpectation], shape: &Shape) -> SweepDescription {
         let scene = self.scene;
         let axes = scene.sweep.groups.iter().enumerate().flat_map(|(group, axes)| {
             axes.iter().map(move |axis| SweepAxis {
@@ -317,7 +334,7 @@ impl Gather<'_> {
             seed: scene.root_seed(),
             has_common_random_numbers: scene.sweep.has_common_numbers,
             reports: self.reports.iter().map(report).collect(),
-            expectations: Vec::new(),
+            expectations: expectations.to_vec(),
         }
     }
 }

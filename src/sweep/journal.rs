@@ -32,6 +32,9 @@ const SESSION: u32 = 2;
 /// killed loses nothing.
 const SYNC: Duration = Duration::from_secs(2);
 
+/// Wall seconds of a replicate that is synced as soon as it is written.
+const WORTH_A_SYNC: f64 = 0.5;
+
 /// Where a replicate stands, and what has to be known of it without reading it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Entry {
@@ -56,6 +59,10 @@ pub enum JournalError {
         doing: &'static str,
         reason: std::io::Error,
     },
+    /// It begins with something else than a journal of this version.
+    Foreign(PathBuf),
+    /// A worker of the sweep ended by itself: a fault of this program.
+    Worker(String),
     /// A frame that was whole when the file was opened is not any more.
     Damaged {
         path: PathBuf,
@@ -72,6 +79,10 @@ impl std::fmt::Display for JournalError {
                 let reason = if full { "no space left on the device".to_owned() } else { reason.to_string() };
                 write!(f, "cannot {doing} {}: {reason}", path.display())
             }
+            Self::Foreign(path) => {
+                write!(f, "{} is no journal of this version: it is left as it is", path.display())
+            }
+            Self::Worker(what) => write!(f, "a fault of this program: {what}"),
             Self::Damaged { path, offset } => {
                 write!(f, "{} is damaged at byte {offset}: it was changed while in use", path.display())
             }
@@ -111,6 +122,10 @@ impl Journal {
         if journal.end < length {
             journal.file.set_len(journal.end).map_err(fail("cut"))?;
         }
+        // The name of a new file is safe only when its folder is.
+        if let Some(folder) = path.parent().filter(|_| length == 0) {
+            File::open(folder).and_then(|folder| folder.sync_all()).map_err(fail("sync the folder of"))?;
+        }
         journal.synced = Instant::now();
         Ok(journal)
     }
@@ -132,7 +147,19 @@ impl Journal {
             synced: Instant::now(),
         };
         journal.scan().map_err(|reason| journal.system("read", reason))?;
+        if journal.end == 0 && journal.is_foreign().map_err(|reason| journal.system("read", reason))? {
+            return Err(JournalError::Foreign(path.to_path_buf()));
+        }
         Ok(journal)
+    }
+
+    /// Whether a file without a whole frame begins like none: not with the magic, nor with a part of it.
+    fn is_foreign(&self) -> std::io::Result<bool> {
+        let mut begin = Vec::new();
+        let mut reader = self.file.try_clone()?;
+        reader.seek(SeekFrom::Start(0))?;
+        reader.take(MAGIC.len() as u64).read_to_end(&mut begin)?;
+        Ok(!MAGIC.starts_with(&begin))
     }
 
     fn system(&self, doing: &'static str, reason: std::io::Error) -> JournalError {
@@ -156,6 +183,11 @@ impl Journal {
                 None => {
                     // The next frame that is whole, if there is one: what lies between is damaged.
                     let Some(next) = next_frame(&mut reader, offset + 1, length, &mut payload)? else {
+                        // A frame that was being written when the program ended is no damage.
+                        reader.seek(SeekFrom::Start(offset))?;
+                        if !is_torn(&mut reader, length - offset)? {
+                            self.damaged.push((offset, length));
+                        }
                         break;
                     };
                     self.damaged.push((offset, next));
@@ -184,12 +216,6 @@ impl Journal {
         self.entries.get(key).copied()
     }
 
-    /// Replicates that ended well, and that did not.
-    pub fn counts(&self) -> (usize, usize) {
-        let done = self.entries.values().filter(|entry| entry.status == Status::Done).count();
-        (done, self.entries.len() - done)
-    }
-
     /// All replicates, in the order in which they were written.
     pub fn entries(&self) -> Vec<(Key, Entry)> {
         let mut list: Vec<(Key, Entry)> = self.entries.iter().map(|(key, entry)| (*key, *entry)).collect();
@@ -199,6 +225,15 @@ impl Journal {
 
     pub fn n_bytes(&self) -> u64 {
         self.end
+    }
+
+    /// Replicates of any ending.
+    pub fn len(&self) -> usize {
+        self.entries.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.entries.is_empty()
     }
 
     /// Reads a replicate again; its checksum is looked at once more.
@@ -218,34 +253,32 @@ impl Journal {
     }
 
     pub fn add_session(&mut self, session: Session) -> Result<u32, JournalError> {
-        let mut payload = Vec::new();
-        session.put(&mut payload);
-        self.append(SESSION, &payload)?;
+        self.append(SESSION, |frame| session.put(frame))?;
         self.sync()?;
         self.sessions.push(session);
         Ok(self.sessions.len() as u32 - 1)
     }
 
     pub fn add(&mut self, replicate: &Replicate) -> Result<(), JournalError> {
-        let mut payload = Vec::new();
-        replicate.put(&mut payload);
         let offset = self.end;
-        self.append(REPLICATE, &payload)?;
+        self.append(REPLICATE, |frame| replicate.put(frame))?;
         let status = replicate.row.status;
         self.entries.insert(replicate.key, Entry { offset, status, session: replicate.session });
-        if self.synced.elapsed() > SYNC {
+        // What took long to run is worth a sync of its own.
+        if replicate.row.wall > WORTH_A_SYNC || self.synced.elapsed() > SYNC {
             self.sync()?;
         }
         Ok(())
     }
 
     /// One write per frame: a kill leaves it whole or cut, and a full disk is undone.
-    fn append(&mut self, kind: u32, payload: &[u8]) -> Result<(), JournalError> {
-        let mut frame = Vec::with_capacity(HEAD + payload.len() + CHECKSUM);
-        frame.extend_from_slice(&MAGIC);
-        frame.extend_from_slice(&kind.to_le_bytes());
-        frame.extend_from_slice(&(payload.len() as u64).to_le_bytes());
-        frame.extend_from_slice(payload);
+    fn append(&mut self, kind: u32, put: impl FnOnce(&mut Vec<u8>)) -> Result<(), JournalError> {
+        let mut frame = vec![0; HEAD];
+        put(&mut frame);
+        let length = (frame.len() - HEAD) as u64;
+        frame[..4].copy_from_slice(&MAGIC);
+        frame[4..8].copy_from_slice(&kind.to_le_bytes());
+        frame[8..HEAD].copy_from_slice(&length.to_le_bytes());
         let checksum = checksum(&frame);
         frame.extend_from_slice(&checksum);
         if let Err(reason) = self.file.write_all(&frame) {
@@ -272,6 +305,17 @@ fn checksum(bytes: &[u8]) -> [u8; CHECKSUM] {
 fn size_of(head: &[u8; HEAD]) -> Option<u64> {
     let length = u64::from_le_bytes(std::array::from_fn(|idx| head[8 + idx]));
     (head[..4] == MAGIC && length <= MAX_PAYLOAD).then(|| length + (HEAD + CHECKSUM) as u64)
+}
+
+/// Whether the last bytes are the beginning of a frame that is longer than they are.
+fn is_torn(reader: &mut impl Read, left: u64) -> std::io::Result<bool> {
+    let mut head = Vec::new();
+    reader.take(HEAD as u64).read_to_end(&mut head)?;
+    if head.len() < HEAD {
+        return Ok(MAGIC.starts_with(&head[..head.len().min(MAGIC.len())]));
+    }
+    let head: [u8; HEAD] = std::array::from_fn(|idx| head[idx]);
+    Ok(size_of(&head).is_some_and(|size| size > left))
 }
 
 /// Kind and size of the frame that begins here, its payload in `payload`; nothing if it is not whole.

@@ -7,6 +7,7 @@ use super::Scene;
 use crate::diagnostic::Diagnostic;
 use crate::scenario::Scenario;
 use crate::scenario::condition::Variable;
+use crate::source::Sources;
 use crate::units::Dimension;
 use rayon::prelude::*;
 
@@ -16,7 +17,7 @@ pub struct Point {
     pub combination: u64,
     /// Processor seconds of one replicate, as the cost model has it.
     pub cost: f64,
-    /// Bytes of particle state.
+    /// Bytes that a run of it needs.
     pub bytes: u64,
     /// Why it cannot be run.
     pub refusal: Option<Box<Refusal>>,
@@ -30,8 +31,18 @@ pub struct Refusal {
 }
 
 impl Refusal {
-    pub fn of(diagnostic: &Diagnostic) -> Self {
-        Self { code: diagnostic.code.0.to_owned(), message: diagnostic.message.clone() }
+    /// The message in one line, with its place and what was found there.
+    fn of(diagnostic: &Diagnostic, sources: &Sources) -> Self {
+        let mut message = diagnostic.message.clone();
+        if let (Some(found), Some(expected)) = (&diagnostic.found, &diagnostic.expected) {
+            message += &format!(": found {found}, expected {expected}");
+        }
+        let known = diagnostic.primary_span().filter(|span| sources.files().any(|(id, _)| id == span.file));
+        if let Some(span) = known {
+            let (line, column) = sources.line_column(span);
+            message += &format!(" ({}:{line}:{column})", sources.file(span.file).name);
+        }
+        Self { code: diagnostic.code.0.to_owned(), message }
     }
 }
 
@@ -42,13 +53,24 @@ pub struct Points {
 }
 
 impl Points {
-    /// Works all combinations out, on all threads of the pool.
-    pub fn of(scene: &Scene) -> Self {
+    /// Works all combinations out, on all threads of the pool; nothing if it was cancelled meanwhile.
+    pub fn of(scene: &Scene, is_cancelled: &(dyn Fn() -> bool + Sync)) -> Option<Self> {
         let n = scene.n_combinations();
-        let list: Vec<Point> =
-            (0..n).into_par_iter().filter_map(|combination| point(scene, combination)).collect();
+        let worked_out = |combination| if is_cancelled() { None } else { Some(point(scene, combination)) };
+        let list: Option<Vec<Vec<Point>>> = (0..n)
+            .into_par_iter()
+            .fold(
+                || Some(Vec::new()),
+                |list: Option<Vec<Point>>, combination| {
+                    let (mut list, found) = (list?, worked_out(combination)?);
+                    list.extend(found);
+                    Some(list)
+                },
+            )
+            .collect();
+        let list: Vec<Point> = list?.into_iter().flatten().collect();
         let n_skipped = n - list.len() as u64;
-        Self { list, n_skipped }
+        Some(Self { list, n_skipped })
     }
 
     pub fn len(&self) -> usize {
@@ -75,11 +97,16 @@ fn point(scene: &Scene, combination: u64) -> Option<Point> {
         combination,
         cost: 0.0,
         bytes: 0,
-        refusal: Some(Box::new(Refusal::of(diagnostic))),
+        refusal: Some(Box::new(Refusal::of(diagnostic, &scene.sources))),
     };
     let scenario = match scene.scenario(combination) {
         Ok(scenario) => scenario,
-        Err(diagnostic) => return Some(refused(&diagnostic)),
+        // A point that is wrong may be one that is skipped for that: its values alone can tell.
+        Err(diagnostic) => {
+            let value = |variable: &Variable| written(scene, combination, variable);
+            let is_skipped = scene.sweep.skips.iter().any(|skip| skip.holds(&value));
+            return (!is_skipped).then(|| refused(&diagnostic));
+        }
     };
     if scene.sweep.skips.iter().any(|skip| skip.holds(&|variable| size(&scenario, variable))) {
         return None;
@@ -89,7 +116,7 @@ fn point(scene: &Scene, combination: u64) -> Option<Point> {
         Some(compiled) => Point {
             combination,
             cost: compiled.cost.cpu_seconds,
-            bytes: compiled.cost.state_bytes,
+            bytes: compiled.cost.bytes(),
             refusal: None,
         },
         None => match diagnostics.iter().find(|diagnostic| diagnostic.is_fatal()) {
@@ -97,6 +124,20 @@ fn point(scene: &Scene, combination: u64) -> Option<Point> {
             None => Point { combination, cost: 0.0, bytes: 0, refusal: None },
         },
     })
+}
+
+/// What the values of a combination say of a variable by themselves; not a number if they do not.
+fn written(scene: &Scene, combination: u64, variable: &Variable) -> f64 {
+    let name = match variable {
+        Variable::Parameter(name) => name.as_str(),
+        Variable::Particles => "particles",
+        Variable::Step => "step",
+        Variable::Bins => "bins",
+        _ => return f64::NAN,
+    };
+    let values = scene.values(combination);
+    let own = values.iter().find(|value| value.target.name() == name);
+    own.map_or(f64::NAN, |value| value.value.si.iter().product())
 }
 
 /// The value of a parameter or a size of a scenario; not a number for what only a run knows.

@@ -40,6 +40,16 @@ impl Series {
     }
 }
 
+impl Series {
+    /// Whether the mean is as precise as was asked for; always, if nothing was asked.
+    pub fn is_precise(&self, replicates: &Replicates) -> bool {
+        let Some(until) = &replicates.until else { return true };
+        let known: Vec<f64> =
+            self.values.iter().flatten().copied().filter(|value| value.is_finite()).collect();
+        is_precise(&known, until.threshold)
+    }
+}
+
 /// Whether the standard error of the mean is below its part of the mean.
 fn is_precise(values: &[f64], threshold: f64) -> bool {
     let n = values.len() as f64;

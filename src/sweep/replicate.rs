@@ -29,6 +29,8 @@ pub struct Task<'a> {
     pub session: u32,
     /// Wall seconds that its plan took.
     pub compile_wall: f64,
+    /// Bytes that it may need; any, if nothing is said.
+    pub memory: Option<u64>,
 }
 
 /// Hash of what is computed from results: with another one, errors and measures are worked out again.
@@ -52,8 +54,9 @@ impl Task<'_> {
         if threads > 1 {
             settings.threads = Some(threads);
         }
-        let outcome = match self.fault(around) {
-            Some(fault) => Err(fault),
+        let refusal = self.too_large().or_else(|| self.fault(around));
+        let outcome = match refusal {
+            Some(refusal) => Err(refusal),
             None => engine::run(&self.plan, &settings, control, &mut sink),
         };
         let outcome = match outcome {
@@ -88,6 +91,12 @@ impl Task<'_> {
             errors,
             snapshots,
         })
+    }
+
+    /// A point that does not fit into this machine fails here and may run on another.
+    fn too_large(&self) -> Option<RunError> {
+        let bytes = self.compiled.cost.bytes();
+        self.memory.is_some_and(|memory| bytes > memory).then_some(RunError::OutOfMemory { bytes })
     }
 
     /// Failures asked for, to test how a sweep bears them.

@@ -13,6 +13,7 @@ use crate::plan::compile::Compiled;
 use crate::scenario::Scenario;
 use crate::table::Status;
 use std::collections::HashMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
@@ -41,6 +42,12 @@ pub struct Settings {
     pub shard: (u32, u32),
 }
 
+/// Where results are kept: the journal that is written, and those of other shards, which are looked into.
+pub struct Store<'a> {
+    pub journal: &'a Mutex<Journal>,
+    pub others: &'a [Journal],
+}
+
 /// How far a sweep is.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Tally {
@@ -49,6 +56,8 @@ pub struct Tally {
     pub n_done: u64,
     pub n_failed: u64,
     pub n_reused: u64,
+    /// Left alone, as only what failed was asked for.
+    pub n_left: u64,
     /// Processor seconds by the cost model: of what was run now, and of what is left of the minimum.
     pub cost_done: f64,
     pub cost_left: f64,
@@ -75,7 +84,7 @@ pub enum Ending {
 pub fn run(
     scene: &Scene,
     points: &Points,
-    journal: &Mutex<Journal>,
+    store: &Store,
     session: u32,
     settings: &Settings,
     around: &Surroundings,
@@ -95,7 +104,7 @@ pub fn run(
     let mut runner = Runner {
         scene,
         points,
-        journal,
+        store,
         session,
         settings,
         around,
@@ -115,7 +124,7 @@ pub fn run(
         _ => Ending::Complete,
     };
     let tally = state.tally;
-    journal.lock().unwrap_or_else(PoisonError::into_inner).sync()?;
+    store.journal.lock().unwrap_or_else(PoisonError::into_inner).sync()?;
     Ok((ending, tally))
 }
 
@@ -148,7 +157,7 @@ struct Open {
 struct Runner<'a> {
     scene: &'a Scene,
     points: &'a Points,
-    journal: &'a Mutex<Journal>,
+    store: &'a Store<'a>,
     session: u32,
     settings: &'a Settings,
     around: &'a Surroundings,
@@ -194,7 +203,13 @@ impl Runner<'_> {
         pool.install(|| {
             let mut current: Option<Current> = None;
             while let Some((number, replicate)) = self.next() {
-                let value = self.end_to_end(&mut current, number, replicate, threads);
+                let work = || self.end_to_end(&mut current, number, replicate, threads);
+                // A worker that panics must not let the others wait for it.
+                let value = catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| {
+                    let what = panic.downcast_ref::<String>().cloned().unwrap_or_default();
+                    self.stop(JournalError::Worker(format!("point {number}, replicate {replicate}: {what}")));
+                    f64::NAN
+                });
                 self.ended(number, replicate, value);
             }
         });
@@ -232,7 +247,7 @@ impl Runner<'_> {
         let replicates = &self.scene.sweep.replicates;
         let mut state = self.lock();
         state.n_running -= 1;
-        if replicates.until.is_some() {
+        if replicates.until.is_some() && !self.settings.is_retry_only {
             let open = state.open.entry(number).or_default();
             open.n_handed = open.n_handed.max(replicates.least);
             open.series.set(replicate, value);
@@ -269,23 +284,33 @@ impl Runner<'_> {
         };
         let (plan, key) = self.scene.replicate(&compiled.plan, combination, replicate);
         let entry = self.journal().entry(&key);
-        let is_done = entry.is_some_and(|entry| entry.status == Status::Done);
-        let is_wanted = !self.settings.is_retry_only || entry.is_some();
-        if is_done || !is_wanted {
-            let recorded = entry.filter(|_| self.scene.sweep.replicates.until.is_some());
-            let value = match recorded.map(|entry| self.journal().replicate(entry)) {
-                Some(Ok(mut recorded)) => {
+        let elsewhere = self.store.others.iter().find_map(|journal| Some((journal, journal.entry(&key)?)));
+        let is_done = entry.is_some_and(|entry| entry.is_done());
+        let is_done_elsewhere = elsewhere.is_some_and(|(_, entry)| entry.is_done());
+        if is_done || is_done_elsewhere {
+            self.tell(number, |tally| tally.n_reused += 1, false);
+            if self.scene.sweep.replicates.until.is_none() {
+                return f64::NAN;
+            }
+            let recorded = match (entry.filter(|entry| entry.is_done()), elsewhere) {
+                (Some(entry), _) => self.journal().replicate(entry),
+                (None, Some((journal, entry))) => journal.replicate(entry),
+                (None, None) => return f64::NAN,
+            };
+            return match recorded {
+                Ok(mut recorded) => {
                     refresh(&mut recorded, scenario, compiled);
                     self.criterion(&recorded)
                 }
-                Some(Err(error)) => {
+                Err(error) => {
                     self.stop(error);
                     f64::NAN
                 }
-                None => f64::NAN,
             };
-            self.tell(number, |tally| tally.n_reused += 1, false);
-            return value;
+        }
+        if self.settings.is_retry_only && entry.is_none() && elsewhere.is_none() {
+            self.tell(number, |tally| tally.n_left += 1, false);
+            return f64::NAN;
         }
         let task = Task {
             scene: self.scene,
@@ -297,6 +322,7 @@ impl Runner<'_> {
             replicate,
             session: self.session,
             compile_wall: *compile_wall,
+            memory: self.settings.memory,
         };
         let control = Cancel(self.watch);
         let Some(ended) = task.run(&control, threads, self.around) else { return f64::NAN };
@@ -322,7 +348,7 @@ impl Runner<'_> {
     }
 
     fn journal(&self) -> MutexGuard<'_, Journal> {
-        self.journal.lock().unwrap_or_else(PoisonError::into_inner)
+        self.store.journal.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     fn stop(&self, error: JournalError) {

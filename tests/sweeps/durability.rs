@@ -74,10 +74,17 @@ fn a_cut_journal_loses_its_last_frame_only() {
         again.says("1 replicates run, 4 known");
         assert_same(&folder, "whole", "cut");
     }
-    // Nothing but rubbish is as good as nothing.
-    std::fs::write(&path, [7; 1000]).unwrap();
-    folder.lamella(&["sweep", "s.lam", "--out", "cut"]).exits(0).says("5 replicates run");
-    assert_same(&folder, "whole", "cut");
+    // An end that is no cut frame is told before it goes.
+    let mut zeroed = bytes.clone();
+    let from = bytes.len() - 300;
+    zeroed[from..].fill(0);
+    std::fs::write(&path, &zeroed).unwrap();
+    let again = folder.lamella(&["sweep", "s.lam", "--out", "cut"]).exits(0);
+    again.says("of the journal are damaged").says("1 replicates run, 4 known");
+    // A file that is no journal is left alone.
+    std::fs::write(&path, b"LmJ2 of another version").unwrap();
+    folder.lamella(&["sweep", "s.lam", "--out", "cut"]).exits(1).says("no journal of this version");
+    assert_eq!(std::fs::read(&path).unwrap(), b"LmJ2 of another version");
 }
 
 #[test]

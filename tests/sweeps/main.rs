@@ -4,7 +4,6 @@ mod durability;
 mod points;
 #[path = "../cli/program.rs"]
 mod program;
-mod provenance;
 mod same_bytes;
 
 use program::Folder;

@@ -117,6 +117,38 @@ fn axes_can_be_given_on_the_command_line() {
 }
 
 #[test]
+fn what_would_be_set_twice_is_refused() {
+    let folder = Folder::new();
+    folder.write("s.lam", scene_with(SWEEP));
+    let set = folder.lamella(&["sweep", "s.lam", "--set", "D=1e-4 m^2/s"]).exits(2);
+    set.says("[W002]").says("`--set` gives `D` one value, and the sweep `study` gives it many");
+    folder.lamella(&["sweep", "s.lam", "--set", "particles=50", "--out", "out"]).exits(0);
+    let both = folder.lamella(&["sweep", "s.lam", "study", "--over", "step=1s"]).exits(2);
+    both.says("[F120]").says("`study` names a sweep of the scene");
+    for axis in ["D linspace(1e-4 m^2/s, 1e-4 m^2/s, 2)", "particles linspace(100, 100, 3)"] {
+        folder.write("s.lam", scene_with(axis));
+        folder.lamella(&["check", "s.lam"]).exits(2).says("[W002]").says("gives the same value twice");
+    }
+    // Whole numbers that rounding makes equal are one value: 10, 10.5, 11.
+    folder.write("s.lam", scene_with("particles linspace(10, 11, 3)"));
+    folder.lamella(&["sweep", "s.lam", "--out", "rounded"]).exits(0).says("2 points");
+}
+
+#[test]
+fn a_replicate_beyond_the_sweep_is_refused() {
+    let folder = run_once();
+    for command in ["why", "repro"] {
+        let refused = folder.lamella(&[command, "out", "2/77"]).exits(2);
+        refused.says("[F122]").says("point 2 has no replicate 77").says("0 to 1");
+    }
+    folder.lamella(&["why", "out", "2/1"]).exits(0);
+    let more = SWEEP.replace("replicates 2", "replicates 2 .. 4 until stderr(err) < 90 % of mean(err)");
+    folder.write("s.lam", scene_with(&more));
+    folder.lamella(&["why", "out", "2/3"]).exits(0);
+    folder.lamella(&["why", "out", "2/4"]).exits(2).says("0 to 3");
+}
+
+#[test]
 fn why_names_the_line() {
     let folder = run_once();
     folder.lamella(&["why", "out", "0"]).exits(0).gives("will not run: complete since");
@@ -157,4 +189,66 @@ fn points_can_be_verified_and_repeated() {
     std::fs::write(&path, bytes).unwrap();
     folder.lamella(&["verify", "alone"]).exits(1).says("[F123]").says("total/part-0000.parquet");
     folder.lamella(&["verify", "nowhere"]).exits(2).says("[F121]");
+}
+
+/// Values that are wrong can be skipped for being wrong; those that are not have rows that say why.
+#[test]
+fn skips_come_before_what_a_scene_refuses() {
+    let folder = Folder::new();
+    let sweep = "  D 1e-3 m^2/s, 5 m^2/s\n  particles 100, 200\n  skip when D > 1 m^2/s and particles > 150";
+    folder.write("s.lam", scene_with(sweep));
+    let done = folder.lamella(&["sweep", "s.lam", "--out", "out"]).exits(1);
+    done.says("3 points, 1 skipped").gives("2 done, 1 failed");
+    let points = lamella::table::read::points(&folder.path("out/points.parquet")).unwrap();
+    let refused = &points[2];
+    assert_eq!((refused.particles, refused.step), (100, 1.0));
+    let message = refused.error_message.as_deref().unwrap();
+    assert!(message.contains("s.lam:21:") && message.contains("found 5"), "{message}");
+    folder.write("none.lam", scene_with("  D 1e-3 m^2/s\n  skip when D > 0 m^2/s"));
+    folder.lamella(&["sweep", "none.lam"]).exits(2).says("[F127]");
+}
+
+#[test]
+fn axes_that_go_together_have_one_order() {
+    let folder = Folder::new();
+    let sweep =
+        "  zip {\n    step 1 s, 2 s, 4 s\n    particles 100, 400, 1600\n  }\n  D 1e-3 m^2/s, 1e-4 m^2/s";
+    folder.write("s.lam", scene_with(&format!("{sweep}\n  expect order(err, step) in 7 .. 8")));
+    folder.lamella(&["sweep", "s.lam", "--out", "a"]).exits(1).gives("NOT MET").gives("over 6 points");
+    // What cannot be told is not met.
+    folder.write("s.lam", scene_with(&format!("{sweep}\n  expect order(leak, step) in 0 .. 1")));
+    let none = folder.lamella(&["sweep", "s.lam", "--out", "b"]).exits(1);
+    none.gives("not known").gives("have no logarithm");
+}
+
+#[test]
+fn a_folder_keeps_its_sweep() {
+    let folder = run_once();
+    folder.write("other.lam", scene_with(SWEEP));
+    folder.lamella(&["sweep", "other.lam", "--out", "out"]).exits(2).says("[F126]").says("`study` of s");
+    let over = |axis: &str| folder.lamella(&["sweep", "s.lam", "--over", axis]).exits(0);
+    over("step=1s,2s").gives("results/s-over-step");
+    over("particles=100,200").gives("results/s-over-particles");
+}
+
+#[test]
+fn what_failed_can_be_run_alone() {
+    let folder = Folder::new();
+    folder.write("s.lam", scene_with("  D linspace(1e-4 m^2/s, 1e-3 m^2/s, 30)"));
+    folder
+        .lamella(&["sweep", "s.lam", "--retry-failed", "--out", "none"])
+        .says("0 replicates run, 30 left alone");
+    let mut command = folder.command(&["sweep", "s.lam", "--out", "out"]);
+    crate::program::finish(command.env("LAMELLA_FAULT_EVERY", "5").output().unwrap()).exits(1);
+    let n_failed = facts(&folder, "out").iter().filter(|row| row.contains("Failed")).count();
+    let again = folder.lamella(&["sweep", "s.lam", "--retry-failed", "--out", "out"]).exits(0);
+    again.says(&format!("{n_failed} replicates run, {} known", 30 - n_failed));
+}
+
+#[test]
+fn a_mean_that_stays_imprecise_is_told() {
+    let folder = Folder::new();
+    let sweep = "  D 1e-3 m^2/s, 1e-4 m^2/s\n  replicates 2 .. 3 until stderr(err) < 0.0001 % of mean(err)";
+    folder.write("s.lam", scene_with(sweep));
+    folder.lamella(&["sweep", "s.lam", "--out", "out"]).exits(0).gives("imprecise   2 points");
 }

@@ -35,6 +35,9 @@ fn shards_do_not_change_a_byte() {
         }
         folder.lamella(&["gather", &out]).exits(0);
         assert_same(&folder, "whole", &out);
+        // What the shards have need not run again.
+        folder.lamella(&["sweep", "s.lam", "--out", &out]).exits(0).says("0 replicates run");
+        assert_same(&folder, "whole", &out);
     }
 }
 

@@ -74,13 +74,12 @@ fn report_twice(checker: &mut Checker<'_>, target: &Target, values: &[AxisValue]
     for value in values {
         let bits: Vec<u64> = value.si.iter().map(|value| value.to_bits()).collect();
         if let Some(first) = seen.insert(bits, value.expr.span) {
-            checker.report(
-                Diagnostic::error(W002, format!("a value of `{}` stands twice", target.name()))
-                    .at(value.expr.span, "here again")
-                    .also(first, "first here")
-                    .found("the same value twice")
-                    .expected("each value once"),
-            );
+            let message = Diagnostic::error(W002, format!("a value of `{}` stands twice", target.name()));
+            let message = match first == value.expr.span {
+                true => message.at(first, "gives the same value twice"),
+                false => message.at(value.expr.span, "here again").also(first, "first here"),
+            };
+            checker.report(message.found("the same value twice").expected("each value once"));
             return;
         }
     }
@@ -146,8 +145,12 @@ fn axis_values<'a>(
     let what = format!("a value of `{}`", target.name());
     let made = |values: Vec<f64>, span: Span| {
         let round = matches!(target, Target::Particles | Target::Bins);
-        let mut values: Vec<f64> = if round { values.iter().map(|v| v.round()).collect() } else { values };
-        values.dedup();
+        let mut values = values;
+        // Neighbours that only rounding made equal are one value; others stay, and are reported.
+        if round && values.windows(2).all(|pair| pair[0] != pair[1]) {
+            values.iter_mut().for_each(|value| *value = value.round());
+            values.dedup();
+        }
         values.into_iter().map(|si| AxisValue { expr: number(si, dimension, span), si: vec![si] }).collect()
     };
     match written {
