@@ -312,8 +312,15 @@ mod tests {
 
     #[test]
     fn the_state_tells_what_is_left_by_cost() {
-        let tally =
-            Tally { n_total: 1000, n_done: 100, n_failed: 1, n_reused: 10, cost_done: 2.0, cost_left: 6.0 };
+        let tally = Tally {
+            n_total: 1000,
+            n_done: 100,
+            n_failed: 1,
+            n_reused: 10,
+            n_left: 0,
+            cost_done: 2.0,
+            cost_left: 6.0,
+        };
         assert_eq!(state(&tally, 10.0), "111 of 1 000 replicates, 1 failed, 30 s left");
         assert_eq!(state(&Tally { n_total: 5, ..Tally::default() }, 1.0), "0 of 5 replicates");
     }
