@@ -215,7 +215,7 @@ impl Sweep {
     }
 
     /// What a journal remembers of this start.
-    pub(crate) fn session(&self, started: i64) -> Session {
+    pub(crate) fn session(&self, started: i64, facts: Vec<(String, String)>) -> Session {
         let texts = self.scene.sources.files().filter(|(_, file)| file.name != "--set");
         Session {
             sources: texts.map(|(_, file)| (file.name.clone(), file.text.clone())).collect(),
@@ -224,7 +224,7 @@ impl Sweep {
             sweep: self.scene.sweep.name.clone(),
             version: env!("CARGO_PKG_VERSION").to_owned(),
             started,
-            facts: vec![("host".to_owned(), machine::host())],
+            facts,
         }
     }
 

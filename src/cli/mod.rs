@@ -7,6 +7,7 @@ mod check;
 mod completions;
 mod error_bars;
 mod explain;
+mod facts;
 mod files;
 mod fmt;
 mod interrupt;

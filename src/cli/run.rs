@@ -1,25 +1,27 @@
 //! `lamella run`: a scene, all the way to tables, errors and a figure.
 
 use super::error_bars::ErrorBars;
-use super::files::{is_stdin, write_whole};
+use super::files::{is_stdin, unwritable, write_whole};
 use super::interrupt::Interrupt;
 use super::load;
 use super::progress::Progress;
 use super::summary::Summary;
 use super::text::{bytes, duration, grouped};
-use super::{CommandResult, Exit, Stopped, Terminal, machine, record};
+use super::{CommandResult, Exit, Stopped, Terminal, facts, machine, record};
 use lamella::Checked;
 use lamella::diagnostic::{Diagnostic, codes};
 use lamella::engine::snapshot::{Outcome, Snapshot, Values};
 use lamella::engine::{self, Control, RunError};
 use lamella::measure::{self, Evaluated};
 use lamella::plan::compile::{Compiled, Options};
-use lamella::report;
+use lamella::report::{self, CRATE_FILE, Provenance, Start};
 use lamella::scenario::Settings;
 use lamella::source::Sources;
-use lamella::table::{Record, Swept, TableError, Writer};
+use lamella::table::{Record, Summary as Written, Swept, TableError, Writer};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+
+const FIGURE: &str = "figure.svg";
 
 /// Run a scene and write its tables
 #[derive(clap::Args)]
@@ -85,6 +87,8 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
         n_threads: arguments.n_threads(),
         wants_figure: arguments.plot,
         wants_error_bars: arguments.error,
+        settings: arguments.set.clone(),
+        file: Some(arguments.file.clone()),
         begin,
     };
     run_checked(checked, asked, terminal)
@@ -104,7 +108,16 @@ pub(crate) fn run_sources(
     let checked = lamella::check(sources, settings, &options);
     let folder = folder.to_path_buf();
     let name = name.to_owned();
-    let asked = Asked { name, folder, n_threads, wants_figure: true, wants_error_bars: false, begin };
+    let asked = Asked {
+        name,
+        folder,
+        n_threads,
+        wants_figure: true,
+        wants_error_bars: false,
+        settings: settings.set.clone(),
+        file: None,
+        begin,
+    };
     run_checked(checked, asked, terminal)
 }
 
@@ -115,6 +128,10 @@ struct Asked {
     n_threads: usize,
     wants_figure: bool,
     wants_error_bars: bool,
+    /// `--set name=value`
+    settings: Vec<(String, String)>,
+    /// Absent if it is none of the user's.
+    file: Option<PathBuf>,
     begin: Instant,
 }
 
@@ -136,6 +153,8 @@ fn run_checked(mut checked: Checked, asked: Asked, terminal: &Terminal) -> Comma
         n_threads: asked.n_threads,
         wants_figure: asked.wants_figure,
         wants_error_bars: asked.wants_error_bars,
+        settings: asked.settings,
+        facts: facts::facts(asked.file.as_deref(), asked.n_threads),
         compile_wall,
         compiled,
     };
@@ -163,6 +182,9 @@ struct Job {
     n_threads: usize,
     wants_figure: bool,
     wants_error_bars: bool,
+    settings: Vec<(String, String)>,
+    /// Of machine, compiler and repository.
+    facts: Vec<(String, String)>,
     compile_wall: f64,
 }
 
@@ -188,12 +210,13 @@ impl Job {
         let errors = report::error_rows(&self.compiled.plan, self.record.n_axes, &found.evaluated.errors);
         let row = self.point(&found);
         let written = writer.finish(vec![row], &errors).map_err(table_failed)?;
-        let figure_path = self.folder.join("figure.svg");
+        let figure_path = self.folder.join(FIGURE);
         match &figure {
             Some(figure) => write_whole(&figure_path, figure)?,
             // A figure of an earlier run must not stand beside the tables of this one.
             None => drop(std::fs::remove_file(&figure_path)),
         }
+        self.write_crate(found.started, &written)?;
         let measures = record::measures(&found.evaluated);
         let summary = Summary {
             folder: &self.folder,
@@ -212,6 +235,29 @@ impl Job {
             terminal.product(&if terminal.is_json() { summary.json() } else { summary.text() })?;
         }
         Ok(Exit::Done)
+    }
+
+    /// Tells where the tables come from.
+    fn write_crate(&self, started: i64, written: &Written) -> Result<(), Stopped> {
+        let version = self.record.version.clone();
+        let figure = self.wants_figure.then(|| FIGURE.to_owned());
+        let provenance = Provenance {
+            scene_name: &self.record.scene_name,
+            title: self.record.title.as_deref(),
+            citations: &self.record.citations,
+            plan_hash: &self.compiled.hash,
+            sweep: None,
+            settings: &self.settings,
+            seed: self.compiled.plan.seed,
+            starts: &[Start { version, started, facts: self.facts.clone() }],
+            started: Some(started),
+            finished: Some(machine::now()),
+            failure: None,
+            files: written.files.iter().map(|file| file.name.clone()).chain(figure).collect(),
+        };
+        let text =
+            provenance.to_json().map_err(|reason| unwritable(&self.folder.join(CRATE_FILE), &reason))?;
+        write_whole(&self.folder.join(CRATE_FILE), &text)
     }
 
     /// Runs the engine; snapshots go to the writer, and stay here if something is computed from them.

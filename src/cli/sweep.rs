@@ -4,7 +4,7 @@ use super::interrupt::Interrupt;
 use super::run::scene_name;
 use super::sweep_folder::{Folder, Shard, gather_and_tell};
 use super::text::{duration, grouped};
-use super::{CommandResult, Exit, Stopped, Terminal, load, machine};
+use super::{CommandResult, Exit, Stopped, Terminal, facts, load, machine};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use lamella::diagnostic::{Diagnostic, codes};
 use lamella::sweep::frame::Replicate;
@@ -85,8 +85,8 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
     let shard = arguments.shard.unwrap_or_default();
     let mut folder = Folder::open(&out, shard)?;
     folder.must_hold(&loaded, &out)?;
-    let session =
-        folder.journal.add_session(loaded.session(machine::now())).map_err(|error| failed(&error))?;
+    let session = loaded.session(machine::now(), facts::facts(Some(&arguments.file), threads));
+    let session = folder.journal.add_session(session).map_err(|error| failed(&error))?;
     announce(&points, &folder, terminal);
     let watch = Progress::new(terminal, &interrupt, &out, &loaded, &points);
     let journal = Mutex::new(folder.journal);

@@ -1,10 +1,11 @@
 //! The folder of a sweep: its journals, `gather` and `status`.
 
+use super::files::write_whole;
 use super::sweep::{failed, pool};
 use super::text::grouped;
 use super::{CommandResult, Exit, Stopped, Terminal, load, machine};
 use lamella::diagnostic::{Diagnostic, codes};
-use lamella::report::ExpectationOutcome;
+use lamella::report::{CRATE_FILE, ExpectationOutcome, Provenance, Start};
 use lamella::sweep::frame::Session;
 use lamella::sweep::gather::{Gather, GatherError, Gathered};
 use lamella::sweep::{Journal, JournalError, Points, manifest};
@@ -190,6 +191,7 @@ pub(crate) fn gather_and_tell(
     manifest::write(out, &gathered.files).map_err(|error| {
         failed(&format!("cannot write {}: {error}", out.join(manifest::MANIFEST).display()))
     })?;
+    write_crate(loaded, journals, &gathered, out)?;
     let report = super::report::write(out)?;
     if !terminal.is_quiet() {
         let text = if terminal.is_json() {
@@ -201,6 +203,51 @@ pub(crate) fn gather_and_tell(
     }
     let is_well = gathered.is_met() && gathered.n_failed == 0 && gathered.n_missing == 0;
     Ok(if is_well { Exit::Done } else { Exit::Failed })
+}
+
+/// Tells where the tables come from, by the sessions that ran what stands in them.
+fn write_crate(
+    loaded: &load::Sweep,
+    journals: &[&Journal],
+    gathered: &Gathered,
+    out: &Path,
+) -> Result<(), Stopped> {
+    let session = |(journal, number): &(usize, u32)| journals.get(*journal)?.sessions.get(*number as usize);
+    let mut sessions: Vec<&Session> = gathered.sessions.iter().filter_map(session).collect();
+    if sessions.is_empty() {
+        // All points were refused before they ran.
+        sessions.extend(journals.iter().flat_map(|journal| &journal.sessions));
+    }
+    let start = |session: &Session| Start {
+        version: session.version.clone(),
+        started: session.started,
+        facts: session.facts.clone(),
+    };
+    let starts = Start::merged(sessions.into_iter().map(start).collect());
+    let missing = match (gathered.n_failed, gathered.n_missing) {
+        (0, 0) => None,
+        (failed, 0) => Some(format!("{failed} replicates or points failed")),
+        (failed, missing) => Some(format!("{failed} replicates or points failed, {missing} are missing")),
+    };
+    let files = gathered.files.iter().map(|file| file.name.clone());
+    let provenance = Provenance {
+        scene_name: &loaded.scene_name,
+        title: loaded.record.title.as_deref(),
+        citations: &loaded.record.citations,
+        plan_hash: &loaded.record.plan_hash,
+        sweep: Some(&gathered.description),
+        settings: &loaded.scene.settings.set,
+        seed: loaded.scene.root_seed(),
+        starts: &starts,
+        started: gathered.started,
+        finished: gathered.finished,
+        failure: missing,
+        files: files
+            .chain([manifest::MANIFEST, "report.html", "report/", "journal/"].map(str::to_owned))
+            .collect(),
+    };
+    let text = provenance.to_json().map_err(|reason| failed(&reason))?;
+    write_whole(&out.join(CRATE_FILE), &text)
 }
 
 fn summary(gathered: &Gathered, out: &Path, report: &Path) -> String {
@@ -215,7 +262,7 @@ fn summary(gathered: &Gathered, out: &Path, report: &Path) -> String {
         let what = format!("{} points, after all replicates that are allowed", grouped(gathered.n_imprecise));
         lines.push(("imprecise", what));
     }
-    for expectation in &gathered.expectations {
+    for expectation in &gathered.description.expectations {
         let verdict = match expectation.outcome {
             ExpectationOutcome::Met => "met",
             ExpectationOutcome::NotMet => "NOT MET",
@@ -238,7 +285,7 @@ fn json(gathered: &Gathered, out: &Path, report: &Path) -> String {
         "failed": gathered.n_failed,
         "missing": gathered.n_missing,
         "imprecise": gathered.n_imprecise,
-        "expectations": gathered.expectations,
+        "expectations": gathered.description.expectations,
     });
     format!("{summary}\n")
 }

@@ -20,6 +20,17 @@ impl Width {
         Self(Arch::Scalar)
     }
 
+    /// What they are called.
+    pub fn name(self) -> &'static str {
+        match self.0 {
+            Arch::Scalar => "those of every machine of its kind",
+            #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+            Arch::V3(_) => "AVX2",
+            #[allow(unreachable_patterns)] // Other machines have other arms.
+            _ => "others",
+        }
+    }
+
     /// Runs an operation. Its `call` must be `#[inline(always)]`, as a closure is not compiled wide.
     #[inline(always)]
     pub fn run<T: NullaryFnOnce>(self, operation: T) -> T::Output {

@@ -12,13 +12,14 @@ use super::{Journal, JournalError, Scene};
 use crate::plan::Plan;
 use crate::plan::compile::Compiled;
 use crate::report::{
-    ExpectationOutcome, SWEEP_FILE, SWEEP_VERSION, SweepAxis, SweepDescription, SweepExpectation,
-    SweepReplicates, SweepReport, SweepReportKind,
+    ExpectationOutcome, SWEEP_FILE, SWEEP_VERSION, SweepAxis, SweepDescription, SweepReplicates, SweepReport,
+    SweepReportKind,
 };
 use crate::scenario::Scenario;
 use crate::scenario::sweep::{Report, ReportKind, Target};
 use crate::table::{Gatherer, PointRow, Record, Shape, Status, TableError, WrittenFile, si_text};
 use rayon::prelude::*;
+use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Most points that are read side by side before their rows are written, and most bytes of theirs.
@@ -36,14 +37,20 @@ pub struct Gathered {
     pub n_missing: u64,
     /// Points whose mean is less precise than was asked for, after all replicates that are allowed.
     pub n_imprecise: u64,
-    pub expectations: Vec<SweepExpectation>,
+    /// What stands in `sweep.json`.
+    pub description: SweepDescription,
+    /// Number of the journal and of the session in it, of each session that ran a replicate of the tables.
+    pub sessions: BTreeSet<(usize, u32)>,
+    /// Of the replicates, microseconds since 1970, UTC.
+    pub started: Option<i64>,
+    pub finished: Option<i64>,
 }
 
 impl Gathered {
     pub fn is_met(&self) -> bool {
         // What a whole sweep cannot tell is not met either.
         let is_whole = self.n_missing == 0;
-        self.expectations.iter().all(|expectation| match expectation.outcome {
+        self.description.expectations.iter().all(|expectation| match expectation.outcome {
             ExpectationOutcome::Met => true,
             ExpectationOutcome::NotMet => false,
             ExpectationOutcome::Unknown => !is_whole,
@@ -112,6 +119,8 @@ struct Whole {
     scenario: Option<Scenario>,
     plan: Option<Plan>,
     replicates: Vec<Replicate>,
+    /// See [`Gathered::sessions`].
+    sessions: BTreeSet<(usize, u32)>,
     is_missing: bool,
     is_imprecise: bool,
 }
@@ -129,7 +138,10 @@ impl Gather<'_> {
             n_failed: 0,
             n_missing: 0,
             n_imprecise: 0,
-            expectations: Vec::new(),
+            description: self.description(&shape),
+            sessions: BTreeSet::new(),
+            started: None,
+            finished: None,
         };
         let batch_size = self.batch_size();
         for (batch_idx, batch) in self.points.list.chunks(batch_size).enumerate() {
@@ -144,9 +156,8 @@ impl Gather<'_> {
             }
         }
         let is_whole = gathered.n_missing == 0;
-        gathered.expectations = judge.judge(is_whole);
-        let description = self.description(&gathered.expectations, &shape);
-        let description = description.to_json().map_err(GatherError::Description)?;
+        gathered.description.expectations = judge.judge(is_whole);
+        let description = gathered.description.to_json().map_err(GatherError::Description)?;
         gathered.files = gatherer.finish(&[(SWEEP_FILE, &description)])?.files;
         Ok(gathered)
     }
@@ -220,10 +231,12 @@ impl Gather<'_> {
     }
 
     fn whole(&self, point: &Point) -> Result<Whole, JournalError> {
+        let mut sessions = BTreeSet::new();
         let nothing = Whole {
             scenario: None,
             plan: None,
             replicates: Vec::new(),
+            sessions: BTreeSet::new(),
             is_missing: false,
             is_imprecise: false,
         };
@@ -241,12 +254,14 @@ impl Gather<'_> {
             }
             let (_, key) = self.scene.replicate(&compiled.plan, point.combination, number);
             // One that ended well comes before one that failed in another shard's journal.
-            let found = self.journals.iter().filter_map(|journal| Some((*journal, journal.entry(&key)?)));
-            let Some((journal, entry)) = found.min_by_key(|(_, entry)| entry.status != Status::Done) else {
+            let found = self.journals.iter().enumerate();
+            let found = found.filter_map(|(idx, journal)| Some((idx, journal.entry(&key)?)));
+            let Some((idx, entry)) = found.min_by_key(|(_, entry)| entry.status != Status::Done) else {
                 is_missing = true;
                 break;
             };
-            let mut replicate = journal.replicate(entry)?;
+            let mut replicate = self.journals[idx].replicate(entry)?;
+            sessions.insert((idx, entry.session));
             refresh(&mut replicate, &scenario, &compiled);
             if let Some(until) = &replicates.until {
                 let value = replicate.row.values.iter().find(|value| value.name == until.measure);
@@ -256,7 +271,7 @@ impl Gather<'_> {
         }
         let is_imprecise = !is_missing && !series.is_precise(replicates);
         let (scenario, plan) = (Some(scenario), Some(compiled.plan));
-        Ok(Whole { scenario, plan, replicates: list, is_missing, is_imprecise })
+        Ok(Whole { scenario, plan, replicates: list, sessions, is_missing, is_imprecise })
     }
 
     fn add(
@@ -291,7 +306,11 @@ impl Gather<'_> {
             return Ok(gatherer.add(&self.base.plan, row, &[], Vec::new())?);
         }
         let (Some(scenario), Some(plan)) = (&whole.scenario, &whole.plan) else { return Ok(()) };
+        gathered.sessions.extend(&whole.sessions);
         for (idx, mut replicate) in whole.replicates.into_iter().enumerate() {
+            let (started, finished) = (replicate.row.started, replicate.row.finished);
+            gathered.started = Some(gathered.started.map_or(started, |first| first.min(started)));
+            gathered.finished = gathered.finished.max(Some(finished));
             let place = (number, idx as u32);
             (replicate.row.point, replicate.row.replicate) = place;
             // A renamed axis is another column, whatever it was called when the point ran.
@@ -310,7 +329,8 @@ impl Gather<'_> {
         Ok(())
     }
 
-    fn description(&self, expectations: &[SweepExpectation], shape: &Shape) -> SweepDescription {
+    /// Expectations are judged when all points are in.
+    fn description(&self, shape: &Shape) -> SweepDescription {
         let scene = self.scene;
         let axes = scene.sweep.groups.iter().enumerate().flat_map(|(group, axes)| {
             axes.iter().map(move |axis| SweepAxis {
@@ -334,7 +354,7 @@ impl Gather<'_> {
             seed: scene.root_seed(),
             has_common_random_numbers: scene.sweep.has_common_numbers,
             reports: self.reports.iter().map(report).collect(),
-            expectations: expectations.to_vec(),
+            expectations: Vec::new(),
         }
     }
 }

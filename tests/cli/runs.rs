@@ -45,7 +45,7 @@ fn with_small() -> Folder {
 fn data_files(folder: &Folder, out: &str) -> Vec<String> {
     let inside = format!("{out}/");
     let names = folder.files().into_iter().filter_map(|name| name.strip_prefix(&inside).map(str::to_owned));
-    names.filter(|name| name != "points.parquet").collect()
+    names.filter(|name| !["points.parquet", "ro-crate-metadata.json"].contains(&name.as_str())).collect()
 }
 
 #[track_caller]

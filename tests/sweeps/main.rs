@@ -4,6 +4,7 @@ mod durability;
 mod points;
 #[path = "../cli/program.rs"]
 mod program;
+mod provenance;
 mod same_bytes;
 
 use program::Folder;

@@ -1,7 +1,7 @@
 //! The report of a folder of results: one page that holds everything, and the numbers of its figures.
 //!
-//! Owns the order of the sections. May use the tables, `sweep.json`, `plan.yaml`, and the figures of
-//! `report`. It deliberately runs nothing and judges nothing: the same folder gives the same bytes.
+//! Owns the order of the sections. May use the tables, `sweep.json`, `plan.yaml`, the crate, and the
+//! figures of `report`. It deliberately runs nothing and judges nothing: the same folder gives the same bytes.
 
 mod bands;
 mod budget;
@@ -18,6 +18,7 @@ mod stats;
 mod study;
 mod work;
 
+use super::ro_crate::{self, CRATE_FILE};
 use super::sweep::{ExpectationOutcome, SWEEP_FILE, SweepDescription, SweepReportKind};
 use crate::table::{TableError, read};
 use html::{Section, escape, paragraph, table};
@@ -93,6 +94,7 @@ pub fn report(folder: &Path) -> Result<Page, ReportError> {
         None => None,
     };
     let plan = text(&folder.join("plan.yaml"))?.map(|text| PlanText::read(&text)).unwrap_or_default();
+    let facts = text(&folder.join(CRATE_FILE))?.map(|text| ro_crate::facts(&text)).unwrap_or_default();
     let footer = read::footer(&points)?;
     let study = Study::read(&points, sweep.as_ref())?;
     let mut book = Book::default();
@@ -116,7 +118,8 @@ pub fn report(folder: &Path) -> Result<Page, ReportError> {
     book.files(files);
     book.failures(&study);
     book.add("left-out", "Left out of the runs", provenance::omissions(&plan));
-    book.add("provenance", "Provenance", provenance::provenance(&footer, &study, sweep.as_ref(), &plan));
+    let origin = provenance::Origin { footer: &footer, sweep: sweep.as_ref(), plan: &plan, facts: &facts };
+    book.add("provenance", "Provenance", provenance::provenance(&study, &origin));
     let scene_title = footer.scene.title.as_deref().unwrap_or(&footer.scene.name);
     let title = match &sweep {
         Some(sweep) => format!("{scene_title}: sweep {}", sweep.name),

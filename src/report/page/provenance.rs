@@ -1,11 +1,12 @@
 //! Where the numbers come from: scene, plan, versions, machines, hours, seeds; and what was left out.
 //!
-//! Owns how these are listed. May use the footer and `plan.yaml`. It deliberately asks neither the
+//! Owns how these are listed. May use the footer, `plan.yaml` and the crate. It deliberately asks neither the
 //! clock nor the machine: the same folder gives the same page.
 
+use super::super::calendar::moment;
 use super::super::sweep::SweepDescription;
 use super::html::{paragraph, table, verbatim};
-use super::quantity::{moment, with_unit};
+use super::quantity::with_unit;
 use super::study::Study;
 use crate::table::Footer;
 use serde::Deserialize;
@@ -51,12 +52,17 @@ pub fn omissions(plan: &PlanText) -> String {
     table(&["left out", "because"], &rows)
 }
 
-pub fn provenance(
-    footer: &Footer,
-    study: &Study,
-    sweep: Option<&SweepDescription>,
-    plan: &PlanText,
-) -> String {
+/// What the files of a folder tell beside its tables.
+pub struct Origin<'a> {
+    pub footer: &'a Footer,
+    pub sweep: Option<&'a SweepDescription>,
+    pub plan: &'a PlanText,
+    /// Of machine, compiler and repository, as they stand in the crate.
+    pub facts: &'a [(String, String)],
+}
+
+pub fn provenance(study: &Study, origin: &Origin) -> String {
+    let Origin { footer, sweep, plan, .. } = *origin;
     let mut rows: Vec<Vec<String>> = Vec::new();
     let mut row = |name: &str, value: String| {
         if !value.is_empty() {
@@ -71,6 +77,9 @@ pub fn provenance(
     row("numerics", joined(&facts.numerics));
     row("host", joined(&facts.hosts));
     row("threads", joined(&facts.threads));
+    for (name, values) in distinct(origin.facts) {
+        row(name, values.join("; "));
+    }
     row("first started", facts.first_started.map(moment).unwrap_or_default());
     row("last finished", facts.last_finished.map(moment).unwrap_or_default());
     let common = if sweep.is_some_and(|sweep| sweep.has_common_random_numbers) {
@@ -104,6 +113,20 @@ pub fn provenance(
         html += &table(&["name", "value", "meaning"], &rows);
     }
     html + "<h3>The scene</h3>\n" + &verbatim(&footer.scene.text, MOST_TEXT)
+}
+
+/// Facts by name with their different values, both as they first come; host and threads stand in the
+/// table of points, too, and are told from there.
+fn distinct(facts: &[(String, String)]) -> Vec<(&str, Vec<&str>)> {
+    let mut list: Vec<(&str, Vec<&str>)> = Vec::new();
+    for (name, value) in facts.iter().filter(|(name, _)| !["host", "threads"].contains(&name.as_str())) {
+        match list.iter_mut().find(|(other, _)| other == name) {
+            Some((_, values)) if values.contains(&value.as_str()) => {}
+            Some((_, values)) => values.push(value),
+            None => list.push((name, vec![value])),
+        }
+    }
+    list
 }
 
 fn joined<T: Display>(values: &std::collections::BTreeSet<T>) -> String {

@@ -85,25 +85,6 @@ pub fn duration(seconds: f64) -> String {
     }
 }
 
-/// Microseconds since 1970 as `2026-01-14 12:00:00 UTC`.
-///
-/// Source: the civil calendar from days, Neri and Schneider, Softw. Pract. Exper. 53 (2023) 937, in the
-/// plain form of eras of 400 years
-pub fn moment(microseconds: i64) -> String {
-    let seconds = microseconds.div_euclid(1_000_000);
-    let (days, second) = (seconds.div_euclid(86_400), seconds.rem_euclid(86_400));
-    // Years begin in March, so that the leap day is the last of one.
-    let since = days + 719_468;
-    let (era, day) = (since.div_euclid(146_097), since.rem_euclid(146_097));
-    let year = (day - day / 1460 + day / 36_524 - day / 146_096) / 365;
-    let day = day - (365 * year + year / 4 - year / 100);
-    let month = (5 * day + 2) / 153;
-    let (day, month) = (day - (153 * month + 2) / 5 + 1, if month < 10 { month + 3 } else { month - 9 });
-    let year = era * 400 + year + i64::from(month <= 2);
-    let (hour, minute, second) = (second / 3600, second / 60 % 60, second % 60);
-    format!("{year:04}-{month:02}-{day:02} {hour:02}:{minute:02}:{second:02} UTC")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -119,13 +100,5 @@ mod tests {
         assert_eq!(interval(-0.5, Some(1e-16)), "−0.5000 ± 0");
         assert_eq!(interval(-0.001, Some(0.16)), "0.00 ± 0.16");
         assert_eq!(interval(2.0, None), "2");
-    }
-
-    #[test]
-    fn moments_are_those_of_the_calendar() {
-        assert_eq!(moment(1_768_392_000_000_000), "2026-01-14 12:00:00 UTC");
-        assert_eq!(moment(951_782_399_000_000), "2000-02-28 23:59:59 UTC");
-        assert_eq!(moment(951_782_400_000_000), "2000-02-29 00:00:00 UTC");
-        assert_eq!(moment(-1), "1969-12-31 23:59:59 UTC");
     }
 }
