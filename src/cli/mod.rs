@@ -25,6 +25,7 @@ mod sweep_folder;
 mod terminal;
 mod text;
 mod verify;
+mod verify_sweep;
 mod why;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};

@@ -157,7 +157,11 @@ pub(crate) fn open(folder: &Path) -> Result<(Vec<Journal>, load::Sweep), Stopped
     Ok((journals, loaded))
 }
 
-fn gather_of<'a>(loaded: &'a load::Sweep, points: &'a Points, journals: &'a [&'a Journal]) -> Gather<'a> {
+pub(crate) fn gather_of<'a>(
+    loaded: &'a load::Sweep,
+    points: &'a Points,
+    journals: &'a [&'a Journal],
+) -> Gather<'a> {
     Gather {
         scene: &loaded.scene,
         points,

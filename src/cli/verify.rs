@@ -1,17 +1,13 @@
 //! `lamella verify` and `lamella repro`: the same again, and the same bytes.
 
-use super::interrupt::Interrupt;
-use super::sweep::{failed, pool, surroundings};
+use super::sweep::{failed, pool};
 use super::sweep_folder::{Which, open, point_of};
-use super::text::grouped;
 use super::why::{check_replicate, is_sweep};
-use super::{CommandResult, Exit, Stopped, Terminal, load, machine, run as run_command};
+use super::{CommandResult, Exit, Stopped, Terminal, machine, run as run_command, verify_sweep};
 use lamella::diagnostic::{Diagnostic, codes};
-use lamella::engine::Control;
+use lamella::report::SWEEP_FILE;
 use lamella::scenario::Settings;
 use lamella::source::Sources;
-use lamella::sweep::replicate::Task;
-use lamella::sweep::{Journal, Points};
 use std::path::{Path, PathBuf};
 
 /// Run results again and compare them, byte by byte
@@ -30,89 +26,16 @@ pub(crate) struct Arguments {
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
     let threads = arguments.threads.map_or_else(machine::n_threads, usize::from);
     if is_sweep(&arguments.folder) {
-        return verify_sweep(&arguments.folder, arguments.sample, threads, terminal);
+        return verify_sweep::verify(&arguments.folder, arguments.sample, threads, terminal);
+    }
+    if arguments.folder.join(SWEEP_FILE).exists() {
+        let text =
+            format!("{} holds the tables of a sweep without their journal", arguments.folder.display());
+        let message = Diagnostic::error(codes::F121, text)
+            .help("what was run stands in the folder `journal`: put it back, or run the sweep again");
+        return Err(Stopped::new(Exit::SceneWrong, message));
     }
     verify_run(&arguments.folder, threads, terminal)
-}
-
-struct Ask<'a>(&'a Interrupt);
-
-impl Control for Ask<'_> {
-    fn step_done(&self, _step: u64, _n_steps: u64) {}
-
-    fn is_cancelled(&self) -> bool {
-        self.0.is_requested()
-    }
-}
-
-fn verify_sweep(folder: &Path, sample: Option<usize>, threads: usize, terminal: &Terminal) -> CommandResult {
-    let interrupt = Interrupt::listen();
-    let (journals, loaded) = open(folder)?;
-    let points = super::sweep::plan_points(&loaded, &pool(threads)?)?;
-    let n = sample.unwrap_or(points.len()).clamp(1, points.len().max(1));
-    let (mut n_same, mut different) = (0_u64, Vec::new());
-    for idx in 0..n.min(points.len()) {
-        let number = (idx * points.len() / n) as u32;
-        for (replicate, is_same) in compare(&loaded, &points, number, &journals, threads, &interrupt)? {
-            if is_same { n_same += 1 } else { different.push(format!("{number}/{replicate}")) }
-        }
-    }
-    if different.is_empty() {
-        terminal.product(&format!("{} replicates run again: the same bytes\n", grouped(n_same)))?;
-        return Ok(Exit::Done);
-    }
-    let shown: Vec<&str> = different.iter().take(10).map(String::as_str).collect();
-    let text = format!(
-        "{} of {} replicates are not the same again",
-        different.len(),
-        different.len() as u64 + n_same
-    );
-    let message = Diagnostic::error(codes::F123, text)
-        .note(format!("points {}", shown.join(", ")))
-        .help("another version or another machine than the one that ran them may be the reason");
-    Err(Stopped::new(Exit::Failed, message))
-}
-
-/// Runs the recorded replicates of a point again.
-fn compare(
-    loaded: &load::Sweep,
-    points: &Points,
-    number: u32,
-    journals: &[Journal],
-    threads: usize,
-    interrupt: &Interrupt,
-) -> Result<Vec<(u32, bool)>, Stopped> {
-    let combination = points.list[number as usize].combination;
-    let Ok((scenario, compiled)) = loaded.scene.compile(combination) else { return Ok(Vec::new()) };
-    let around = surroundings();
-    let mut verdicts = Vec::new();
-    for replicate in 0.. {
-        let (plan, key) = loaded.scene.replicate(&compiled.plan, combination, replicate);
-        let found = journals.iter().find_map(|journal| Some((journal, journal.entry(&key)?)));
-        let Some((journal, entry)) = found else { break };
-        if !entry.is_done() {
-            continue;
-        }
-        let recorded = journal.replicate(entry).map_err(|error| failed(&error))?;
-        let task = Task {
-            scene: &loaded.scene,
-            scenario: &scenario,
-            compiled: &compiled,
-            plan,
-            key,
-            combination,
-            replicate,
-            session: 0,
-            compile_wall: 0.0,
-            memory: None,
-        };
-        let Some(again) = task.run(&Ask(interrupt), threads.max(2), &around) else {
-            let message = Diagnostic::error(codes::R101, "the comparison was interrupted");
-            return Err(Stopped::new(Exit::Interrupted, message));
-        };
-        verdicts.push((replicate, again.has_bytes_of(&recorded)));
-    }
-    Ok(verdicts)
 }
 
 /// A run of its own: again into a temporary folder, and all data files compared.
@@ -173,7 +96,8 @@ fn different_files(first: &Path, second: &Path) -> std::io::Result<Vec<String>> 
     Ok(different)
 }
 
-fn compare_file(
+/// Notes the file if `second` has other bytes than `first`, or `first` has none.
+pub(super) fn compare_file(
     first: &Path,
     second: &Path,
     name: String,

@@ -60,6 +60,18 @@ pub enum Scalar {
     Binary(Binary, Box<Scalar>, Box<Scalar>),
 }
 
+impl Scalar {
+    /// Whether it hangs on the clock: two runs of one plan give other values.
+    pub fn is_timed(&self) -> bool {
+        match self {
+            Self::Fact(fact) => matches!(fact, Fact::WallTime | Fact::CpuTime),
+            Self::Number(_) | Self::Norm(..) => false,
+            Self::Unary(_, operand) => operand.is_timed(),
+            Self::Binary(_, left, right) => left.is_timed() || right.is_timed(),
+        }
+    }
+}
+
 /// An expression whose value is a field over the bins and times of one output.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

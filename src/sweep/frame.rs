@@ -23,13 +23,19 @@ pub struct Replicate {
 }
 
 impl Replicate {
-    /// Whether results and errors are the same, bit by bit.
-    pub fn has_bytes_of(&self, other: &Self) -> bool {
+    /// Whether results, errors and measures are the same, bit by bit. `is_timed` tells of the measures
+    /// that hang on the clock, which are not compared.
+    pub fn has_bytes_of(&self, other: &Self, is_timed: &dyn Fn(&str) -> bool) -> bool {
         let bytes = |replicate: &Self| {
             let mut bytes = Vec::new();
             replicate.snapshots.put(&mut bytes);
             replicate.errors.put(&mut bytes);
             replicate.row.status.put(&mut bytes);
+            for value in replicate.row.values.iter().filter(|value| !is_timed(&value.name)) {
+                value.name.put(&mut bytes);
+                value.unit.put(&mut bytes);
+                value.value.put(&mut bytes);
+            }
             bytes
         };
         bytes(self) == bytes(other)

@@ -19,6 +19,7 @@ pub mod why;
 
 pub use journal::{Journal, JournalError};
 pub use points::{Point, Points};
+pub use queue::Series;
 pub use scene::Scene;
 
 /// A hash: of a plan with its seed, of an evaluation.

@@ -6,6 +6,7 @@ mod points;
 mod program;
 mod provenance;
 mod same_bytes;
+mod verified;
 
 use program::Folder;
 
