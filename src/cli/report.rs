@@ -66,12 +66,17 @@ fn failed(error: &ReportError) -> Stopped {
     let message = Diagnostic::error(codes::F101, error.to_string());
     match error {
         ReportError::NoResults(_) => {
-            let help = "`lamella run scene.lam` writes results/scene; give that folder";
+            let help = "`lamella run scene.lam` writes results/scene; give that folder. The tables of a sweep \
+                        are made by `lamella gather`";
             Stopped::new(Exit::SceneWrong, message.help(help))
         }
         // What is damaged was whole once: running again makes it anew.
         ReportError::Table(TableError::Foreign { .. } | TableError::Format { .. }) => {
             Stopped::new(Exit::Failed, message.help("run the scene again to make the folder anew"))
+        }
+        ReportError::Mixed { .. } => {
+            let help = "run the scene again, or `lamella gather` the sweep, to make the tables anew";
+            Stopped::new(Exit::Failed, message.help(help))
         }
         ReportError::Table(_) | ReportError::Text { .. } => Stopped::new(Exit::Failed, message),
     }

@@ -6,6 +6,7 @@ use super::interrupt::Interrupt;
 use super::load;
 use super::progress::Progress;
 use super::summary::Summary;
+use super::sweep_folder::{holds_sweep, other_kind};
 use super::text::{bytes, duration, grouped};
 use super::{CommandResult, Exit, Stopped, Terminal, facts, machine, record};
 use lamella::Checked;
@@ -137,6 +138,9 @@ struct Asked {
 
 fn run_checked(mut checked: Checked, asked: Asked, terminal: &Terminal) -> CommandResult {
     let interrupt = Interrupt::listen();
+    if holds_sweep(&asked.folder) {
+        return Err(other_kind(&asked.folder, "a sweep", "a run"));
+    }
     terminal.diagnostics(&checked.diagnostics, &checked.sources);
     let (Some(compiled), Some(scenario)) = (checked.compiled.take(), checked.scenario.take()) else {
         return Ok(Exit::SceneWrong);

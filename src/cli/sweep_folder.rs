@@ -5,7 +5,7 @@ use super::sweep::{failed, pool};
 use super::text::grouped;
 use super::{CommandResult, Exit, Stopped, Terminal, load, machine};
 use lamella::diagnostic::{Diagnostic, codes};
-use lamella::report::{CRATE_FILE, ExpectationOutcome, Provenance, Start};
+use lamella::report::{CRATE_FILE, ExpectationOutcome, Provenance, SWEEP_FILE, Start};
 use lamella::sweep::frame::Session;
 use lamella::sweep::gather::{Gather, GatherError, Gathered};
 use lamella::sweep::{Journal, JournalError, Points, manifest};
@@ -80,6 +80,9 @@ pub(crate) struct Folder {
 
 impl Folder {
     pub(crate) fn open(out: &Path, shard: Shard) -> Result<Self, Stopped> {
+        if !holds_sweep(out) && out.join("points.parquet").is_file() {
+            return Err(other_kind(out, "the results of a run", "a sweep"));
+        }
         let name = format!("shard-{:04}-of-{:04}.journal", shard.number, shard.of);
         let journal = Journal::open(&out.join("journal").join(&name)).map_err(|error| failed(&error))?;
         let paths = journal_paths(out).into_iter().filter(|path| path.file_name() != Some(name.as_ref()));
@@ -102,6 +105,19 @@ impl Folder {
             .help("give another folder with `--out`, or remove this one");
         Err(Stopped::new(Exit::SceneWrong, message))
     }
+}
+
+/// True of a folder that a sweep has written to.
+pub(crate) fn holds_sweep(folder: &Path) -> bool {
+    !journal_paths(folder).is_empty() || folder.join(SWEEP_FILE).is_file()
+}
+
+/// Refuses a folder that holds a sweep, for a run, or a run, for a sweep.
+pub(crate) fn other_kind(folder: &Path, holds: &str, asks: &str) -> Stopped {
+    let message = Diagnostic::error(codes::F125, format!("{} holds {holds}", folder.display()))
+        .expected(format!("a folder of its own for {asks}"))
+        .help("give another folder with `--out`, or remove this one");
+    Stopped::new(Exit::SceneWrong, message)
 }
 
 /// Files of journals, in the order of their names.

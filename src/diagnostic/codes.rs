@@ -64,6 +64,7 @@ codes! {
     F122 "there is no such point",
     F123 "a result is not the same again",
     F124 "what will run again, and why",
+    F125 "a folder holds results of another kind",
     F126 "a folder holds another sweep",
     F127 "a sweep has no point",
     R101 "the run was interrupted",

@@ -100,8 +100,7 @@ impl Writer {
         self.error_bars = rows;
     }
 
-    /// Completes every file, then gives all of them their names; `points.parquet` comes last, so
-    /// that a folder whose points tell of a plan holds the whole of it.
+    /// Completes every file, then gives all of them their names.
     pub fn finish(mut self, mut points: Vec<PointRow>, errors: &[ErrorRow]) -> Result<Summary, TableError> {
         let begin = Instant::now();
         let mut tables: Vec<(String, Vec<Column>)> = Vec::new();
@@ -165,11 +164,15 @@ impl Writer {
         sheet.finish()
     }
 
+    /// Gives all files their names. The earlier `points.parquet` goes first and the new one comes last: a
+    /// folder whose points tell of a plan holds the whole of it. A program that is killed in between, which
+    /// is a matter of milliseconds, leaves tables without points, and never those of two plans as one.
     pub(super) fn publish(
         &self,
         texts: Vec<Draft>,
         done: Vec<(String, Finished)>,
     ) -> Result<Vec<WrittenFile>, TableError> {
+        self.remove_points()?;
         for draft in texts {
             draft.publish()?;
         }
@@ -181,6 +184,15 @@ impl Writer {
             files.push(WrittenFile { name, n_rows: file.n_rows, n_bytes: file.n_bytes });
         }
         Ok(files)
+    }
+
+    fn remove_points(&self) -> Result<(), TableError> {
+        let path = self.folder.join("points.parquet");
+        match fs::remove_file(&path) {
+            Ok(()) => sync_folder(&self.folder),
+            Err(reason) if reason.kind() == std::io::ErrorKind::NotFound => Ok(()),
+            Err(reason) => Err(TableError::system(&path, "remove", reason, 0)),
+        }
     }
 
     /// Takes away parts of an earlier run that this run does not replace.

@@ -232,6 +232,35 @@ fn a_folder_keeps_its_sweep() {
 }
 
 #[test]
+fn a_folder_holds_a_run_or_a_sweep() {
+    let folder = run_once();
+    let before = std::fs::read(folder.path("out/points.parquet")).unwrap();
+    folder.lamella(&["run", "s.lam", "--out", "out"]).exits(2).says("[F125]").says("out holds a sweep");
+    assert_eq!(std::fs::read(folder.path("out/points.parquet")).unwrap(), before);
+    folder.lamella(&["run", "s.lam", "--out", "single"]).exits(0);
+    folder.lamella(&["sweep", "s.lam", "--out", "single"]).exits(2).says("[F125]").says("results of a run");
+    assert!(!folder.path("single/journal").exists());
+}
+
+/// What a kill between two names, or a copy, can leave.
+#[test]
+fn tables_of_two_plans_are_not_reported() {
+    let folder = run_once();
+    folder.lamella(&["report", "out"]).exits(0);
+    folder.lamella(&["run", "s.lam", "--seed", "99", "--out", "single"]).exits(0);
+    std::fs::copy(
+        folder.path("single/profile/part-0000.parquet"),
+        folder.path("out/profile/part-0000.parquet"),
+    )
+    .unwrap();
+    folder.lamella(&["report", "out"]).exits(1).says("are of two plans or two").says("lamella gather");
+    folder.lamella(&["gather", "out"]).exits(0);
+    folder.lamella(&["report", "out"]).exits(0);
+    std::fs::remove_file(folder.path("out/points.parquet")).unwrap();
+    folder.lamella(&["report", "out"]).exits(2).says("no points.parquet").says("lamella gather");
+}
+
+#[test]
 fn what_failed_can_be_run_alone() {
     let folder = Folder::new();
     folder.write("s.lam", scene_with("  D linspace(1e-4 m^2/s, 1e-3 m^2/s, 30)"));

@@ -20,7 +20,8 @@ mod work;
 
 use super::ro_crate::{self, CRATE_FILE};
 use super::sweep::{ExpectationOutcome, SWEEP_FILE, SweepDescription, SweepReportKind};
-use crate::table::{TableError, read};
+use crate::table::scan::parts;
+use crate::table::{Footer, Kind, TableError, read};
 use html::{Section, escape, paragraph, table};
 use provenance::PlanText;
 use std::fmt;
@@ -58,6 +59,10 @@ pub enum ReportError {
         path: PathBuf,
         reason: String,
     },
+    /// A table that tells of another plan than `points.parquet`.
+    Mixed {
+        file: PathBuf,
+    },
 }
 
 impl fmt::Display for ReportError {
@@ -68,6 +73,11 @@ impl fmt::Display for ReportError {
             }
             Self::Table(error) => error.fmt(f),
             Self::Text { path, reason } => write!(f, "cannot read `{}`: {reason}", path.display()),
+            Self::Mixed { file } => write!(
+                f,
+                "`{}` and the points.parquet of the folder are of two plans or two scenes",
+                file.display()
+            ),
         }
     }
 }
@@ -78,6 +88,19 @@ impl From<TableError> for ReportError {
     fn from(error: TableError) -> Self {
         Self::Table(error)
     }
+}
+
+/// Tables that were copied together are no result.
+fn of_one_plan(folder: &Path, points: &Footer) -> Result<(), ReportError> {
+    for kind in Kind::ALL {
+        for file in parts(folder, kind) {
+            let footer = read::footer(&file)?;
+            if footer.plan != points.plan || footer.scene != points.scene {
+                return Err(ReportError::Mixed { file });
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Makes the report of a folder, of a sweep or of a single run, from its tables alone.
@@ -96,6 +119,7 @@ pub fn report(folder: &Path) -> Result<Page, ReportError> {
     let plan = text(&folder.join("plan.yaml"))?.map(|text| PlanText::read(&text)).unwrap_or_default();
     let facts = text(&folder.join(CRATE_FILE))?.map(|text| ro_crate::facts(&text)).unwrap_or_default();
     let footer = read::footer(&points)?;
+    of_one_plan(folder, &footer)?;
     let study = Study::read(&points, sweep.as_ref())?;
     let mut book = Book::default();
     if let Some(sweep) = &sweep {
