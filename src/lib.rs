@@ -3,6 +3,7 @@
 //! The flow: [`syntax::tree::File`] → `Scenario` → [`plan::Plan`] → [`engine::snapshot::Snapshot`] → `Table` → `Report`.
 
 pub mod catalog;
+pub mod chemistry;
 pub mod diagnostic;
 pub mod engine;
 pub mod estimate;

@@ -119,6 +119,7 @@ impl<'a, const D: usize> Program<'a, D> {
         let moves = self.mover.is_moving();
         let works = stages.iter().map(|stage| match stage {
             Stage::Mix => Work { mixes: relaxes, ..Work::default() },
+            Stage::React => Work::default(),
             Stage::Move => Work { moves, ..Work::default() },
             Stage::Bound => Work { bounds: moves, ..Work::default() },
             Stage::Average => Work { averages: relaxes, ..Work::default() },

@@ -73,6 +73,7 @@ pub fn estimate(plan: &Plan) -> Cost {
     };
     let cost_of = |stage: Stage| match stage {
         Stage::Mix => table::MIX * n_relaxed,
+        Stage::React => 0.0,
         Stage::Move => move_cost * n_axes,
         Stage::Bound => table::BOUND * n_axes,
         Stage::Average => table::AVERAGE * n_values,

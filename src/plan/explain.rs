@@ -93,6 +93,7 @@ fn scene_lines(plan: &Plan) -> Vec<String> {
 
 fn stage_words(stage: Stage) -> &'static str {
     match stage {
+        Stage::React => "react: what the particles carry reacts at its rates",
         Stage::Mix => "mix: relax towards the means of the bins",
         Stage::Move => "move: drift and dispersion",
         Stage::Bound => "bound: apply the sides of the domain",

@@ -41,6 +41,7 @@ pub fn lower(scenario: &Scenario) -> Result<(Plan, Evaluation), Vec<Diagnostic>>
         components,
         mixing: scenario.mixing.as_ref().map(lower_mixing),
         reactions: scenario.reactions.iter().map(lower_reaction).collect(),
+        chemistry: None,
         time: time(scenario),
         outputs: scenario.outputs.iter().map(lower_output).collect(),
         stages: vec![Stage::Mix, Stage::Move, Stage::Bound, Stage::Average, Stage::Observe],
@@ -132,7 +133,7 @@ fn components(scenario: &Scenario, problems: &mut Vec<Diagnostic>) -> Vec<Compon
     let mut list = Vec::new();
     for species in &scenario.species {
         match build_tape(&species.initial, &scenario.species) {
-            Some(initial) => list.push(Component { name: species.name.clone(), initial }),
+            Some(initial) => list.push(Component { name: species.name.clone(), initial, is_immobile: false }),
             None => problems.push(too_large(species.initial.span)),
         }
     }

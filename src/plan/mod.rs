@@ -5,6 +5,7 @@
 
 pub mod build_tape;
 mod check;
+pub mod chemistry;
 pub mod compile;
 pub mod cost;
 pub mod document;
@@ -19,6 +20,7 @@ pub mod tape;
 pub use crate::scenario::{OutputKind, Placement, Side};
 pub use compile::{Compiled, Options, Selection, compile, hash};
 
+use chemistry::Chemistry;
 use serde::{Deserialize, Serialize};
 use tape::Tape;
 
@@ -40,6 +42,9 @@ pub struct Plan {
     pub components: Vec<Component>,
     pub mixing: Option<Mixing>,
     pub reactions: Vec<InstantReaction>,
+    /// Reactions at finite rates and in equilibrium; absent where there are none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub chemistry: Option<Chemistry>,
     pub time: Time,
     pub outputs: Vec<Output>,
     /// What one step does, in order.
@@ -110,6 +115,14 @@ pub struct Component {
     pub name: String,
     /// Initial value; inputs of the tape are x, y, z, t (SI, frame coordinates).
     pub initial: Tape,
+    /// True: it does not move with the fluid, and lives in the bins of the averages.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub is_immobile: bool,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)] // serde asks for a reference.
+fn is_false(value: &bool) -> bool {
+    !*value
 }
 
 /// Mixing zones by exchange with the mean (MRIEM).
@@ -191,6 +204,8 @@ pub struct OutputUnit {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Stage {
+    /// Let what the particles carry react.
+    React,
     /// Relax towards the bin means of the positions reached.
     Mix,
     /// Advect and disperse.

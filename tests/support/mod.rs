@@ -111,6 +111,7 @@ pub fn plain(axes: Vec<Axis>, walk: Walk, n_particles: u64, duration: f64, step:
         components: vec![Component { name: "A".to_owned(), initial: constant(1.0) }],
         mixing: None,
         reactions: vec![],
+        chemistry: None,
         ..front(n_particles, 1, duration, step)
     }
 }

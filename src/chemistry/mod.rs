@@ -1,0 +1,5 @@
+//! Chemistry on particles: rates, their integration over a step, and equilibrium.
+//!
+//! Owns what happens to the concentrations of one particle, many particles at a time. May use the words
+//! and the plan. It deliberately knows no positions in memory, no zones and no bins: the engine hands it
+//! columns of carried values and gets them back reacted.
