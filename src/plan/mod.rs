@@ -10,6 +10,7 @@ pub mod compile;
 pub mod cost;
 pub mod document;
 mod edges;
+pub mod eliminate;
 pub mod evaluation;
 pub mod explain;
 pub mod limits;
