@@ -3,3 +3,7 @@
 //! Owns what happens to the concentrations of one particle, many particles at a time. May use the words
 //! and the plan. It deliberately knows no positions in memory, no zones and no bins: the engine hands it
 //! columns of carried values and gets them back reacted.
+
+mod reactor;
+
+pub use reactor::{Batch, Failure, Propagator, Reactor, Scratch, Why, Work};
