@@ -4,6 +4,8 @@
 //! and the plan. It deliberately knows no positions in memory, no zones and no bins: the engine hands it
 //! columns of carried values and gets them back reacted.
 
+mod observed;
 mod reactor;
 
+pub use observed::Observed;
 pub use reactor::{Batch, Failure, Propagator, Reactor, Scratch, Why, Work};

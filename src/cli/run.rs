@@ -342,6 +342,8 @@ pub(super) fn run_failed(error: &RunError) -> Stopped {
     let (exit, code) = match error {
         RunError::Cancelled => (Exit::Interrupted, codes::R101),
         RunError::NonFiniteInitial { .. }
+        | RunError::WrongInBin { .. }
+        | RunError::Chemistry { .. }
         | RunError::NonFinitePosition { .. }
         | RunError::NonFiniteConcentration { .. }
         | RunError::NegativeConcentration { .. }

@@ -5,6 +5,7 @@
 
 use super::parallel;
 use super::program::{Program, Role};
+use super::react::Added;
 use crate::state::particles::{Block, CHUNK};
 
 /// Sums of one column.
@@ -39,10 +40,11 @@ impl Amount {
         }
     }
 
-    /// Relative change since `before`.
-    pub fn defect_of(sum: f64, before: &Self) -> f64 {
-        let scale = before.sum.abs().max(before.size);
-        if scale > 0.0 { (sum - before.sum).abs() / scale } else { (sum - before.sum).abs() }
+    /// Relative difference to what was there before and what reactions added.
+    pub fn defect_of(sum: f64, before: &Self, added: Added) -> f64 {
+        let scale = before.sum.abs().max(before.size).max(added.size);
+        let defect = (sum - (before.sum + added.sum)).abs();
+        if scale > 0.0 { defect / scale } else { defect }
     }
 }
 
@@ -63,14 +65,19 @@ pub fn worse(a: f64, b: f64) -> f64 {
     if a.is_nan() || a > b { a } else { b }
 }
 
-/// Largest relative change per component over its conserved columns.
-pub fn defects<const D: usize>(program: &Program<D>, before: &[Amount], sums: &[f64]) -> Vec<f64> {
+/// Largest relative change per component over its columns, apart from what reactions `added`.
+pub fn defects<const D: usize>(
+    program: &Program<D>,
+    before: &[Amount],
+    added: &[Added],
+    sums: &[f64],
+) -> Vec<f64> {
     let n_slots = program.roles.len();
     let of_component = |component: usize| {
         let columns = (0..n_slots).filter(|&slot| program.roles[slot] != Role::Mean);
         let of_slot = |slot: usize| {
             let column = component * n_slots + slot;
-            Amount::defect_of(sums[column], &before[column])
+            Amount::defect_of(sums[column], &before[column], added[component])
         };
         columns.map(of_slot).fold(0.0, worse)
     };

@@ -18,9 +18,21 @@ pub enum RunError {
         particle: u64,
         position: Vec<f64>,
     },
+    /// The initial value of something immobile, negative or no number.
+    WrongInBin {
+        component: String,
+        position: Vec<f64>,
+        value: f64,
+    },
     NonFinitePosition {
         step: u64,
         particle: u64,
+    },
+    /// Laws that cannot be integrated over a step, or that have no equilibrium.
+    Chemistry {
+        step: u64,
+        particle: u64,
+        what: String,
     },
     NonFiniteConcentration {
         step: u64,
@@ -64,6 +76,15 @@ impl fmt::Display for RunError {
                 "the initial value of `{component}` is not a finite number for particle {particle} at {} m",
                 place(position)
             ),
+            Self::WrongInBin { component, position, value } => write!(
+                f,
+                "the initial value of `{component}` at {} m is {}; zero or more is possible",
+                place(position),
+                precise(*value)
+            ),
+            Self::Chemistry { step, particle, what } => {
+                write!(f, "step {step}: the chemistry of particle {particle} cannot be solved: {what}")
+            }
             Self::NonFinitePosition { step, particle } => {
                 write!(f, "step {step}: the position of particle {particle} is not a finite number")
             }

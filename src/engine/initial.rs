@@ -7,6 +7,7 @@ use super::error::RunError;
 use super::parallel;
 use super::place::{Strata, place};
 use super::program::Program;
+use crate::plan::{Component, Species};
 use crate::state::particles::{BLOCK, Block, state_bytes};
 
 /// All blocks of the run.
@@ -38,7 +39,8 @@ fn fill<const D: usize>(program: &Program<D>, block: &mut Block<D>) -> Result<()
     }
     let n_slots = program.roles.len();
     let mut scratch = Vec::new();
-    for (component_idx, component) in program.plan.components.iter().enumerate() {
+    let carried = &program.plan.components[..program.n_components()];
+    for (component_idx, component) in carried.iter().enumerate() {
         let columns = &mut block.columns[component_idx * n_slots..][..n_slots];
         let Some((first, others)) = columns.split_first_mut() else { continue };
         component.initial.evaluate_block(&inputs, &mut scratch, first);
@@ -58,7 +60,8 @@ fn fill<const D: usize>(program: &Program<D>, block: &mut Block<D>) -> Result<()
 /// from nothing. Values of rounding size, relative to what they are made of, pass.
 fn check_signs<const D: usize>(program: &Program<D>, block: &Block<D>) -> Result<(), RunError> {
     let n_slots = program.roles.len();
-    for species in &program.plan.species {
+    let is_carried = |species: &&Species| species.terms.iter().all(|&(k, _)| k < program.n_components());
+    for species in program.plan.species.iter().filter(is_carried) {
         for idx in 0..block.n_particles {
             let (mut value, mut size) = (species.constant, species.constant.abs());
             for &(component, coefficient) in &species.terms {
@@ -77,4 +80,32 @@ fn check_signs<const D: usize>(program: &Program<D>, block: &Block<D>) -> Result
         }
     }
     Ok(())
+}
+
+/// What lives in bins: the values of the expressions at their centres, per immobile component and slot. The
+/// slot outside holds nothing.
+pub fn immobile<const D: usize>(program: &Program<D>) -> Result<Vec<Vec<f64>>, RunError> {
+    let n_bins = program.grid.n_bins();
+    let mut centres = [const { Vec::new() }; 3];
+    for (rank, axis) in program.plan.axes.iter().enumerate() {
+        centres[axis.index] = (0..n_bins).map(|bin| program.grid.centre(bin)[rank]).collect();
+    }
+    let zeros = vec![0.0; n_bins];
+    let of = |index: usize| if centres[index].is_empty() { &zeros[..] } else { &centres[index][..] };
+    let inputs = [of(0), of(1), of(2), &zeros[..]];
+    let mut scratch = Vec::new();
+    let of_component = |component: &Component| {
+        let mut values = vec![0.0; n_bins];
+        component.initial.evaluate_block(&inputs, &mut scratch, &mut values);
+        if let Some(bin) = values.iter().position(|value| !(value.is_finite() && *value >= 0.0)) {
+            return Err(RunError::WrongInBin {
+                component: component.name.clone(),
+                position: program.grid.centre(bin).to_vec(),
+                value: values[bin],
+            });
+        }
+        values.push(0.0);
+        Ok(values)
+    };
+    program.plan.components[program.n_components()..].iter().map(of_component).collect()
 }

@@ -14,6 +14,8 @@ mod observe;
 mod parallel;
 mod place;
 mod program;
+mod react;
+mod reactions;
 mod run;
 mod schedule;
 mod sides;

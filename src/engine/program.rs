@@ -6,7 +6,7 @@
 use super::error::RunError;
 use super::sides::Rule;
 use super::walk::Mover;
-use crate::plan::{Mixing, OutputKind, Plan, Quantity, Side, Stage, ZoneRate};
+use crate::plan::{Mixing, OutputKind, Plan, Quantity, Side, Species, Stage, ZoneRate};
 use crate::state::grid::Grid;
 
 /// What a stored column of a component is.
@@ -33,6 +33,7 @@ pub enum Term {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Work {
     pub mixes: bool,
+    pub reacts: bool,
     pub moves: bool,
     pub bounds: bool,
     pub averages: bool,
@@ -55,6 +56,9 @@ pub struct Program<'a, const D: usize> {
     pub carried_fraction: f64,
     /// The passes over memory that make a step, in order.
     pub passes: Vec<Work>,
+    /// How species follow from components at the instant that is looked at.
+    pub species: Vec<Species>,
+    n_mobile: usize,
 }
 
 impl<'a, const D: usize> Program<'a, D> {
@@ -86,13 +90,16 @@ impl<'a, const D: usize> Program<'a, D> {
             mean_weights,
             carried_fraction,
             passes: Vec::new(),
+            species: plan.species.clone(),
+            n_mobile: plan.n_mobile(),
         };
         program.passes = program.passes_of(&plan.stages);
         Ok(program)
     }
 
+    /// Components that particles carry; those that live in bins come after them.
     pub fn n_components(&self) -> usize {
-        self.plan.components.len()
+        self.n_mobile
     }
 
     pub fn n_columns(&self) -> usize {
@@ -102,6 +109,18 @@ impl<'a, const D: usize> Program<'a, D> {
     /// Whether particles see means at all.
     pub fn has_mixing(&self) -> bool {
         self.plan.mixing.is_some()
+    }
+
+    /// Sums per slot that a reaction leaves: one for each immobile component, then two per column if there
+    /// are zones, of its values and of those above zero.
+    pub fn n_reaction_sums(&self) -> usize {
+        let n_immobile = self.plan.components.len() - self.n_mobile;
+        n_immobile + if self.has_mixing() { 2 * self.n_columns() } else { 0 }
+    }
+
+    /// Whether what a particle reacts with hangs on its bin: a mean, or what lives there.
+    pub fn is_coupled(&self) -> bool {
+        self.has_mixing() || self.plan.has_immobile()
     }
 
     /// Factor `e^{−χΔt/2}` per slot; `None` where nothing relaxes.
@@ -117,13 +136,19 @@ impl<'a, const D: usize> Program<'a, D> {
     fn passes_of(&self, stages: &[Stage]) -> Vec<Work> {
         let relaxes = self.roles.iter().any(|role| !matches!(role, Role::Fixed));
         let moves = self.mover.is_moving();
+        let reacts = self.plan.reacts_in_steps();
+        let is_coupled = reacts && self.is_coupled();
+        let averages = relaxes || is_coupled;
         let works = stages.iter().map(|stage| match stage {
             Stage::Mix => Work { mixes: relaxes, ..Work::default() },
-            Stage::React => Work::default(),
+            Stage::React => Work { reacts, ..Work::default() },
+            Stage::FusedReact => Work { mixes: relaxes, reacts, ..Work::default() },
             Stage::Move => Work { moves, ..Work::default() },
             Stage::Bound => Work { bounds: moves, ..Work::default() },
-            Stage::Average => Work { averages: relaxes, ..Work::default() },
-            Stage::FusedStep => Work { mixes: relaxes, moves, bounds: moves, averages: relaxes },
+            Stage::Average => Work { averages, ..Work::default() },
+            Stage::FusedStep => {
+                Work { mixes: relaxes, reacts: reacts && !is_coupled, moves, bounds: moves, averages }
+            }
             Stage::Observe => Work::default(),
         });
         works.filter(|work| *work != Work::default()).collect()
@@ -219,6 +244,10 @@ fn check_indices(plan: &Plan, n_axes: usize) -> Result<(), RunError> {
     if plan.axes.iter().any(|axis| axis.index > 2) {
         return Err(unsound("an axis beyond x, y and z"));
     }
+    let n_mobile = plan.n_mobile();
+    if plan.components[..n_mobile].iter().any(|component| component.is_immobile) {
+        return Err(unsound("an immobile component before a mobile one"));
+    }
     for component in &plan.components {
         component
             .initial
@@ -247,7 +276,13 @@ fn check_indices(plan: &Plan, n_axes: usize) -> Result<(), RunError> {
         });
         let needs_bins = !matches!(output.kind, OutputKind::Total | OutputKind::Particles);
         let is_binned = !needs_bins || output.bins.len() == n_axes;
-        if !is_quantity_sound || !is_binned {
+        let is_immobile = |species: usize| plan.species[species].terms.iter().any(|&(k, _)| k >= n_mobile);
+        let is_mixing_sound = output.kind != OutputKind::Mixing
+            || output.quantities.iter().all(|quantity| match *quantity {
+                Quantity::Pair(a, b) => !is_immobile(a) && !is_immobile(b),
+                Quantity::Species(_) => false,
+            });
+        if !is_quantity_sound || !is_binned || !is_mixing_sound {
             return Err(unsound("an output whose species or bins do not fit"));
         }
     }

@@ -11,6 +11,8 @@ use super::error::RunError;
 use super::observe::{self, Instant, Lab};
 use super::parallel::{self, Pool};
 use super::program::{Program, Work};
+use super::react::Span;
+use super::reactions::{Reactions, Yield};
 use super::schedule::{Due, schedule, step_length};
 use super::snapshot::{Outcome, Snapshot};
 use super::step::{OnBlock, Pass, Scratch, Trouble};
@@ -48,6 +50,7 @@ pub struct Run<'a, const D: usize> {
     before: Vec<Amount>,
     /// Smallest value allowed per component.
     pub limits: Vec<f64>,
+    pub reactions: Reactions,
 }
 
 /// Sums and the first trouble of consecutive blocks.
@@ -55,6 +58,7 @@ pub struct Run<'a, const D: usize> {
 struct Group {
     sums: Vec<f64>,
     trouble: Option<Trouble>,
+    yields: Yield,
 }
 
 pub fn run<const D: usize>(
@@ -77,8 +81,11 @@ pub fn run<const D: usize>(
         };
     for step in 0..=plan.time.n_steps {
         while let Some(due) = dues.next_if(|due| due.steps == step) {
-            let instant = run.instant(due);
-            hand_out(&run, due, instant, &mut clock, &mut loop_clock)?;
+            run.look_at(due.t, step)?;
+            match run.ahead(due)? {
+                Some(ahead) => hand_out(&ahead, due, Instant::Now, &mut clock, &mut loop_clock)?,
+                None => hand_out(&run, due, run.instant(due), &mut clock, &mut loop_clock)?,
+            }
         }
         if control.is_cancelled() {
             return Err(RunError::Cancelled);
@@ -105,8 +112,9 @@ impl<'a, const D: usize> Run<'a, D> {
     fn new(plan: &'a Plan, settings: &Settings) -> Result<Self, RunError> {
         let mut program = Program::<D>::new(plan)?;
         program.mover.takes_half_draws = settings.takes_half_draws;
-        let blocks = initial::blocks(&program)?;
+        let mut blocks = initial::blocks(&program)?;
         let before = amount::amounts(&blocks, program.n_columns());
+        let reactions = Reactions::new(&program, &mut blocks)?;
         let limits = limits(&program, &before);
         let blocks_per_group = average::blocks_per_group(plan.particles.count, program.grid.n_slots());
         let n_groups = blocks.len().div_ceil(blocks_per_group);
@@ -126,11 +134,33 @@ impl<'a, const D: usize> Run<'a, D> {
             blocks_per_group,
             before,
             limits,
+            reactions,
         })
     }
 
+    /// The same state, to go another way from here.
+    pub(super) fn copy(&self) -> Self {
+        Self {
+            program: self.program.clone(),
+            width: self.width,
+            blocks: self.blocks.clone(),
+            walk: self.walk.clone(),
+            bridge: self.bridge.clone(),
+            means: self.means.clone(),
+            pending: self.pending.clone(),
+            is_averaged: self.is_averaged,
+            labs: Pool::new(),
+            scratches: Pool::new(),
+            groups: self.groups.iter().map(|_| Group::default()).collect(),
+            blocks_per_group: self.blocks_per_group,
+            before: self.before.clone(),
+            limits: self.limits.clone(),
+            reactions: self.reactions.copy(),
+        }
+    }
+
     /// How the state is to be seen at a due time.
-    fn instant(&self, due: &Due) -> Instant<D> {
+    pub(super) fn instant(&self, due: &Due) -> Instant<D> {
         if due.fraction == 0.0 {
             return Instant::Now;
         }
@@ -142,28 +172,44 @@ impl<'a, const D: usize> Run<'a, D> {
     fn step(&mut self, step: u64) -> Result<(), RunError> {
         let dt = step_length(&self.program.plan.time, step);
         let leap = self.program.mover.leap(dt, dt.sqrt());
+        self.reactions.begin_step(step as f64 * self.program.plan.time.step, dt);
         let passes = self.program.passes.clone();
         for work in passes {
-            self.is_averaged &= !work.moves;
             let mixes = work.mixes && self.pending.is_some();
-            self.pass(Work { mixes, ..work }, step, leap)?;
-            if work.mixes {
-                self.pending = None;
+            let work = Work { mixes, ..work };
+            if work.reacts && self.program.is_coupled() {
+                self.react_in_bins(work, step)?;
+                continue;
             }
+            let spans = if work.reacts { self.reactions.take_spans() } else { Vec::new() };
+            self.is_averaged &= !work.moves;
+            self.pass(work, step, leap, &spans)?;
             if work.averages {
                 self.pending = Some(self.program.decays(dt));
-                self.is_averaged = true;
                 self.check_amounts(step)?;
             }
         }
+        self.reactions.end_step();
         Ok(())
     }
 
-    /// One pass over all blocks, in parallel over groups.
-    fn pass(&mut self, work: Work, step: u64, leap: Leap<D>) -> Result<(), RunError> {
+    /// One pass over all blocks, in parallel over groups. What reacts does so over `spans`.
+    pub(super) fn pass(
+        &mut self,
+        work: Work,
+        step: u64,
+        leap: Leap<D>,
+        spans: &[Span],
+    ) -> Result<(), RunError> {
         let stride = self.program.n_columns() + 1;
-        let sums_len = if work.averages { self.program.grid.n_slots() * stride } else { 0 };
-        let n_lanes = average::lanes(self.program.grid.n_slots());
+        let n_places = self.program.grid.n_slots();
+        let n_reaction_sums = self.program.n_reaction_sums();
+        let sums_len = match work {
+            Work { averages: true, .. } => n_places * stride,
+            Work { reacts: true, .. } => n_places * n_reaction_sums,
+            _ => 0,
+        };
+        let n_lanes = if work.averages { average::lanes(n_places) } else { 1 };
         let pass = Pass {
             program: &self.program,
             work,
@@ -172,6 +218,7 @@ impl<'a, const D: usize> Run<'a, D> {
             stream: &self.walk,
             means: &self.means,
             decays: self.pending.as_deref().unwrap_or_default(),
+            reaction: self.reactions.reaction(&self.program, &self.means, spans),
             limits: &self.limits,
             n_lanes,
             width: self.width,
@@ -183,37 +230,58 @@ impl<'a, const D: usize> Run<'a, D> {
             scratches.lend(Scratch::<D>::new, |scratch| {
                 scratch.sums.clear();
                 scratch.sums.resize(sums_len * n_lanes, 0.0);
+                scratch.bench.clear(pass.program);
                 for block in blocks.iter_mut() {
                     width.run(OnBlock { pass: &pass, block, scratch, trouble: &mut group.trouble });
                 }
                 group.sums.clear();
                 group.sums.resize(sums_len, 0.0);
+                let stride = if work.averages { stride } else { n_reaction_sums.max(1) };
                 average::fold_lanes(&scratch.sums, n_lanes, stride, &mut group.sums);
+                group.yields.take(&mut scratch.bench);
             });
         });
         if let Some(trouble) = self.groups.iter().find_map(|group| group.trouble) {
             return Err(self.explain(trouble, work, step));
         }
+        if work.mixes {
+            self.pending = None;
+        }
         if work.averages {
             self.merge();
+            self.is_averaged = true;
+        } else if !spans.is_empty() {
+            let sums = self.merged_sums();
+            self.reactions.settle(&self.program, sums, self.groups.iter().map(|group| &group.yields));
+            self.is_averaged = false;
         }
         Ok(())
     }
 
-    /// Sums of groups in their order, then means.
-    fn merge(&mut self) {
-        let Some((first, others)) = self.groups.split_first_mut() else { return };
+    /// Sums of groups in their order.
+    fn merged_sums(&mut self) -> Vec<f64> {
+        let Some((first, others)) = self.groups.split_first_mut() else { return Vec::new() };
         for group in others {
             first.sums.iter_mut().zip(&group.sums).for_each(|(sum, part)| *sum += part);
         }
-        self.means.assign(&self.program, &first.sums);
+        std::mem::take(&mut first.sums)
+    }
+
+    /// Sums of groups in their order, then means.
+    fn merge(&mut self) {
+        let sums = self.merged_sums();
+        self.means.assign(&self.program, &sums);
+        if let Some(first) = self.groups.first_mut() {
+            // Its memory serves again.
+            first.sums = sums;
+        }
     }
 
     fn check_amounts(&self, step: u64) -> Result<(), RunError> {
         if self.means.totals.iter().any(|total| !total.is_finite()) {
             return Err(self.find_non_finite(step));
         }
-        let defects = amount::defects(&self.program, &self.before, &self.means.totals);
+        let defects = amount::defects(&self.program, &self.before, &self.reactions.added, &self.means.totals);
         match defects.iter().position(|&defect| defect > LOST) {
             None => Ok(()),
             Some(idx) => Err(RunError::MassLost {
@@ -251,6 +319,11 @@ impl<'a, const D: usize> Run<'a, D> {
     fn explain(&self, trouble: Trouble, work: Work, step: u64) -> RunError {
         match trouble {
             Trouble::Position { particle } => RunError::NonFinitePosition { step: step + 1, particle },
+            Trouble::Chemistry { particle, why } => {
+                // What reacts does so over the step before.
+                let what = self.reactions.explain(&self.program, why);
+                RunError::Chemistry { step: step.max(1), particle, what }
+            }
             Trouble::Negative { component, first } => {
                 let (particle, value) = self.find_below(component, first);
                 // A pass that relaxes and then averages does the relaxation of the step before.
@@ -282,15 +355,10 @@ impl<'a, const D: usize> Run<'a, D> {
 
     /// Does what is pending and compares the amounts.
     fn finish(&mut self) -> Result<Vec<f64>, RunError> {
-        if self.pending.is_some() {
-            let step = self.program.plan.time.n_steps.saturating_sub(1);
-            let leap = self.program.mover.leap(0.0, 0.0);
-            self.pass(Work { mixes: true, ..Work::default() }, step, leap)?;
-            self.pending = None;
-        }
+        self.settle_pending(self.program.plan.time.n_steps.saturating_sub(1))?;
         let after: Vec<f64> =
             amount::amounts(&self.blocks, self.program.n_columns()).iter().map(|amount| amount.sum).collect();
-        Ok(amount::defects(&self.program, &self.before, &after))
+        Ok(amount::defects(&self.program, &self.before, &self.reactions.added, &after))
     }
 }
 

@@ -6,7 +6,9 @@
 use super::average::{self, Means};
 use super::mix;
 use super::program::{Program, Work};
+use super::react::{Bench, Chunk, Reaction};
 use super::walk::{Leap, Noise, Place};
+use crate::chemistry::Why;
 use crate::maths::wide::Width;
 use crate::state::particles::{Block, CHUNK};
 use crate::state::stream::Stream;
@@ -19,11 +21,18 @@ pub struct Scratch<const D: usize> {
     pub target: [f64; CHUNK],
     /// Sums per slot and lane.
     pub sums: Vec<f64>,
+    pub bench: Bench,
 }
 
 impl<const D: usize> Scratch<D> {
     pub fn new() -> Box<Self> {
-        Box::new(Self { noise: [[0.0; CHUNK]; D], slots: [0; CHUNK], target: [0.0; CHUNK], sums: Vec::new() })
+        Box::new(Self {
+            noise: [[0.0; CHUNK]; D],
+            slots: [0; CHUNK],
+            target: [0.0; CHUNK],
+            sums: Vec::new(),
+            bench: Bench::default(),
+        })
     }
 }
 
@@ -38,6 +47,10 @@ pub enum Trouble {
         component: usize,
         first: u64,
     },
+    Chemistry {
+        particle: u64,
+        why: Why,
+    },
 }
 
 /// Constants of a pass, the same for all blocks.
@@ -51,6 +64,7 @@ pub struct Pass<'a, const D: usize> {
     /// Means and decays of the relaxation.
     pub means: &'a Means,
     pub decays: &'a [Option<f64>],
+    pub reaction: Option<Reaction<'a, D>>,
     /// Smallest value allowed per component.
     pub limits: &'a [f64],
     pub n_lanes: usize,
@@ -86,6 +100,22 @@ impl<const D: usize> pulp::NullaryFnOnce for OnBlock<'_, D> {
                     mix::relax(program, pass.means, pass.decays, slots, &mut chunk, target, pass.limits);
                 if let Some(component) = below {
                     trouble.get_or_insert(Trouble::Negative { component, first });
+                }
+            }
+            if let Some(reaction) = &pass.reaction {
+                let positions = positions.each_ref().map(|axis| &**axis);
+                if program.is_coupled() {
+                    program.grid.locate(positions, slots);
+                }
+                let memory = match &mut block.memory[..] {
+                    [] => &mut [][..],
+                    memory => &mut memory[range.clone()],
+                };
+                let mut columns = mix::cut(&mut columns, range.clone());
+                let chunk = Chunk { n, positions, slots, columns: &mut columns, memory };
+                if let Err(failure) = reaction.react(chunk, &mut scratch.bench, &mut scratch.sums) {
+                    let particle = first + failure.particle as u64;
+                    trouble.get_or_insert(Trouble::Chemistry { particle, why: failure.why });
                 }
             }
             if pass.work.moves {

@@ -44,7 +44,7 @@ pub struct Kinetics {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Kinetic {
     pub name: String,
-    /// `(component index, coefficient)`, in the order of components.
+    /// `(component index, coefficient)`, in the order of components. See [`Method::Observed`].
     pub changes: Vec<(usize, f64)>,
     pub law: Law,
 }
@@ -74,7 +74,8 @@ pub struct Laws {
 #[serde(rename_all = "snake_case")]
 pub enum Method {
     /// First-order network with constant coefficients: the matrix exponential, applied to what is carried
-    /// when somebody looks; reactions and transport commute.
+    /// when somebody looks; reactions and transport commute. The `changes` are those of species then, by
+    /// species index: components are unreacted.
     Observed,
     /// The same, applied in each step, since others react too or species do not all move alike.
     Exponential,
@@ -145,4 +146,22 @@ pub enum Activity {
     ExtendedDebyeHuckel,
     /// `log₁₀ γ = −A z² (√I / (1 + √I) − 0.3 I)`
     Davies,
+}
+
+impl super::Plan {
+    /// Whether particles react in each step.
+    pub fn reacts_in_steps(&self) -> bool {
+        let kinetics = self.chemistry.as_ref().and_then(|chemistry| chemistry.kinetics.as_ref());
+        kinetics.is_some_and(|kinetics| kinetics.method != Method::Observed)
+    }
+
+    /// Whether something lives in bins.
+    pub fn has_immobile(&self) -> bool {
+        self.components.iter().any(|component| component.is_immobile)
+    }
+
+    /// Components that particles carry; those that live in bins come last.
+    pub fn n_mobile(&self) -> usize {
+        self.components.iter().filter(|component| !component.is_immobile).count()
+    }
 }

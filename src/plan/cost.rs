@@ -1,5 +1,6 @@
 //! What a run will cost: time from a table of measured stage costs, memory from the state.
 
+use super::chemistry::Method;
 use super::{Normals, Output, OutputKind, Plan, Stage, ZoneRate};
 use serde::Serialize;
 
@@ -15,6 +16,14 @@ mod table {
     pub(super) const AVERAGE: f64 = 0.9;
     /// Relaxation of one stored value.
     pub(super) const MIX: f64 = 0.7;
+    /// One reaction of a particle in closed form, with reading and writing it.
+    pub(super) const CLOSED_FORM: f64 = 8.0;
+    /// One entry of a matrix exponential applied.
+    pub(super) const PROPAGATE: f64 = 0.5;
+    /// One operation of the laws in an explicit sub-step of seven stages.
+    pub(super) const EXPLICIT: f64 = 8.0;
+    /// One operation of the laws or of the elimination in an implicit sub-step.
+    pub(super) const ROSENBROCK: f64 = 10.0;
     /// One particle observed once: positions worked out again, species restored, sums.
     pub(super) const OBSERVE: f64 = 25.0;
     /// One value of a bin observed once: its sums, mean and error.
@@ -71,14 +80,18 @@ pub fn estimate(plan: &Plan) -> Cost {
         Normals::Single => table::MOVE_SINGLE,
         Normals::Double => table::MOVE_DOUBLE,
     };
+    let react_cost = react_cost(plan);
     let cost_of = |stage: Stage| match stage {
         Stage::Mix => table::MIX * n_relaxed,
-        Stage::React => 0.0,
+        Stage::React => react_cost,
+        Stage::FusedReact => react_cost + table::MIX * n_relaxed,
         Stage::Move => move_cost * n_axes,
         Stage::Bound => table::BOUND * n_axes,
         Stage::Average => table::AVERAGE * n_values,
         Stage::FusedStep => {
-            move_cost * n_axes + table::BOUND * n_axes + table::AVERAGE * n_values + table::MIX * n_relaxed
+            let step = move_cost * n_axes + table::BOUND * n_axes + table::AVERAGE * n_values;
+            let is_coupled = plan.stages.contains(&Stage::FusedReact);
+            if is_coupled { step } else { step + table::MIX * n_relaxed + react_cost }
         }
         Stage::Observe => 0.0,
     };
@@ -99,6 +112,21 @@ pub fn estimate(plan: &Plan) -> Cost {
         particle_steps,
         stages,
         cpu_seconds: nanoseconds * 1e-9,
+    }
+}
+
+/// Nanoseconds per particle and step; how many sub-steps stiff laws take is not known before the run.
+fn react_cost(plan: &Plan) -> f64 {
+    let Some(kinetics) = plan.chemistry.as_ref().and_then(|chemistry| chemistry.kinetics.as_ref()) else {
+        return 0.0;
+    };
+    let n = plan.components.len() as f64;
+    match kinetics.method {
+        Method::Observed => 0.0,
+        Method::Pair | Method::Saturation | Method::Zero => table::CLOSED_FORM,
+        Method::Exponential => table::PROPAGATE * n * n,
+        Method::Explicit => table::EXPLICIT * kinetics.laws.operations.len() as f64,
+        Method::Rosenbrock => table::ROSENBROCK * (kinetics.laws.operations.len() as f64 + n * n * n / 3.0),
     }
 }
 

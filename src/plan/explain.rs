@@ -98,6 +98,7 @@ fn stage_words(stage: Stage) -> &'static str {
         Stage::Move => "move: drift and dispersion",
         Stage::Bound => "bound: apply the sides of the domain",
         Stage::Average => "average: sums and means per bin",
+        Stage::FusedReact => "mix and react in one pass over memory",
         Stage::FusedStep => "mix, move, bound and average in one pass over memory",
         Stage::Observe => "observe: outputs that are due",
     }

@@ -205,7 +205,7 @@ pub struct OutputUnit {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Stage {
-    /// Let what the particles carry react.
+    /// What the particles carry reacts, at the positions reached.
     React,
     /// Relax towards the bin means of the positions reached.
     Mix,
@@ -215,7 +215,9 @@ pub enum Stage {
     Bound,
     /// Bin index of every particle, sums per bin, means.
     Average,
-    /// Mix (of the step before), Move, Bound and Average in one pass over memory.
+    /// Mix and React in one pass over memory, both of the step before.
+    FusedReact,
+    /// Mix and React (of the step before), Move, Bound and Average in one pass over memory.
     FusedStep,
     /// Outputs due.
     Observe,

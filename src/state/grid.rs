@@ -45,6 +45,18 @@ impl<const D: usize> Grid<D> {
         self.bins
     }
 
+    /// Middle of a bin.
+    pub fn centre(&self, bin: usize) -> [f64; D] {
+        let mut rest = bin;
+        let mut centre = [0.0; D];
+        for axis in (0..D).rev() {
+            let along = rest % self.bins[axis];
+            rest /= self.bins[axis];
+            centre[axis] = self.low[axis] + (along as f64 + 0.5) / self.inverse_width[axis];
+        }
+        centre
+    }
+
     pub fn has_open_side(&self) -> bool {
         self.is_open.contains(&true)
     }
@@ -124,6 +136,18 @@ mod tests {
         let mut slots = [0; 4];
         grid.locate([&[-1e-300, 1.5, 1.0, f64::INFINITY]], &mut slots);
         assert_eq!(slots, [10, 10, 9, 10]);
+    }
+
+    #[test]
+    fn a_bin_holds_its_centre() {
+        let grid = Grid::new([0.0, -1.0, 3.0], [2.0, 1.0, 4.0], [2, 4, 5], [false; 3]).unwrap();
+        for bin in 0..grid.n_bins() {
+            let centre = grid.centre(bin);
+            let mut slot = [0];
+            grid.locate([&centre[..1], &centre[1..2], &centre[2..]], &mut slot);
+            assert_eq!(slot[0] as usize, bin);
+        }
+        assert_eq!(grid.centre(0), [0.5, -0.75, 3.1]);
     }
 
     #[test]

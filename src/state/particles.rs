@@ -24,6 +24,8 @@ pub struct Block<const D: usize> {
     pub positions: [Vec<f64>; D],
     /// Carried columns one after the other, each `n_particles` long.
     pub columns: Vec<Vec<f64>>,
+    /// What an integrator keeps for each particle; empty if nothing needs it.
+    pub memory: Vec<f32>,
 }
 
 impl<const D: usize> Block<D> {
@@ -40,7 +42,7 @@ impl<const D: usize> Block<D> {
             *axis = zeros()?;
         }
         let columns = (0..n_columns).map(|_| zeros()).collect::<Result<_, u64>>()?;
-        Ok(Self { idx, n_particles, positions, columns })
+        Ok(Self { idx, n_particles, positions, columns, memory: Vec::new() })
     }
 
     /// Number of the first particle.

@@ -26,7 +26,7 @@ fn sheet() -> Plan {
     plan.axes = vec![axis(0, -0.01, 0.01, Side::Open, 8), axis(1, 0.0, 0.02, Side::Periodic, 6)];
     plan.axes[0].high_side = Side::Reflect;
     plan.walk = Walk { drift: vec![1e-5, -2e-5], spread: vec![5e-4, 1e-4, 3e-4], normals: Normals::Single };
-    plan.components.push(Component { name: "C".to_owned(), initial: constant(0.25) });
+    plan.components.push(Component { name: "C".to_owned(), initial: constant(0.25), is_immobile: false });
     plan.species.push(species("C", 0.0, vec![(1, 1.0), (0, 0.5)]));
     plan.mixing.as_mut().unwrap().zones =
         vec![zone("slow", 0.25, ZoneRate::Finite(0.01)), zone("fast", 0.5, ZoneRate::Instant)];

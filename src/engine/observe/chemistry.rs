@@ -79,7 +79,7 @@ pub fn speciate<const D: usize>(
     unreacted: &mut [[f64; CHUNK]],
     species: &mut [[f64; CHUNK]],
 ) {
-    for (idx, recipe) in program.plan.species.iter().enumerate().filter(|&(idx, _)| needs.unreacted[idx]) {
+    for (idx, recipe) in program.species.iter().enumerate().filter(|&(idx, _)| needs.unreacted[idx]) {
         let target = &mut unreacted[idx][..n];
         combine(recipe.constant, &recipe.terms, components, target);
         if needs.reacted[idx] {
@@ -172,11 +172,12 @@ pub fn slopes<const D: usize>(
     unreacted: &[[f64; CHUNK]],
     slopes: &mut [[f64; CHUNK]],
 ) {
-    let (species, n_components) = (&program.plan.species, program.n_components());
+    let (species, n_components) = (&program.species, program.n_components());
     for (idx, recipe) in species.iter().enumerate().filter(|&(idx, _)| needs.reacted[idx]) {
         let own = &mut slopes[idx * n_components..][..n_components];
         own.iter_mut().for_each(|slope| slope[..n].fill(0.0));
-        recipe.terms.iter().for_each(|&(k, coefficient)| own[k][..n].fill(coefficient));
+        let carried = recipe.terms.iter().filter(|&&(k, _)| k < n_components);
+        carried.for_each(|&(k, coefficient)| own[k][..n].fill(coefficient));
     }
     for (reaction, _) in
         program.plan.reactions.iter().zip(&needs.reactions).filter(|&(_, &is_needed)| is_needed)
@@ -193,7 +194,7 @@ pub fn slopes<const D: usize>(
                 continue;
             }
             for (idx, coefficient) in changes(reaction).filter(|&(idx, _)| needs.reacted[idx]) {
-                for &(k, own) in &species[limiting.0].terms {
+                for &(k, own) in species[limiting.0].terms.iter().filter(|&&(k, _)| k < n_components) {
                     slopes[idx * n_components + k][particle] += coefficient * own / limiting.1;
                 }
             }

@@ -12,7 +12,9 @@ use super::super::run::Run;
 use super::super::step::Scratch;
 use super::super::walk::{Leap, Noise, Place};
 use super::chemistry::{self, Needs};
+use crate::maths::wide::Width;
 use crate::state::particles::{Block, CHUNK};
+use crate::state::stream::Stream;
 use std::ops::Range;
 
 /// Which instant is looked at.
@@ -70,6 +72,49 @@ impl<const D: usize> Instant<D> {
     }
 }
 
+impl<const D: usize> Between<D> {
+    /// Takes positions to the instant.
+    #[inline(always)]
+    fn place(
+        &self,
+        program: &Program<D>,
+        draws: &Draws,
+        at: (u64, u64),
+        positions: &mut [&mut [f64]; D],
+        noise: &mut Noise<D>,
+    ) {
+        let place = |step| Place { block_idx: at.0, chunk_idx: at.1, step };
+        if let Some((step, leap)) = &self.before {
+            program.mover.draw_once(draws.width, draws.walk, place(*step), noise);
+            leap.apply(positions, noise);
+        }
+        program.mover.draw_once(draws.width, draws.walk, place(self.step), noise);
+        self.along.apply(positions, noise);
+        program.mover.draw_once(draws.width, draws.bridge, place(self.bridge), noise);
+        self.across.apply(positions, noise);
+        for (rule, positions) in program.rules.iter().zip(positions) {
+            // A position that is not finite stops the step itself.
+            let _ = rule.apply(positions);
+        }
+    }
+
+    /// Takes the particles of a block to the instant.
+    pub fn carry(&self, program: &Program<D>, draws: &Draws, block: &mut Block<D>) {
+        let mut noise = [[0.0; CHUNK]; D];
+        for (chunk_idx, range) in block.chunks().enumerate() {
+            let mut positions = block.positions.each_mut().map(|axis| &mut axis[range.clone()]);
+            self.place(program, draws, (block.idx, chunk_idx as u64), &mut positions, &mut noise);
+        }
+    }
+}
+
+/// Where random numbers come from.
+pub struct Draws<'a> {
+    pub width: Width,
+    pub walk: &'a Stream,
+    pub bridge: &'a Stream,
+}
+
 /// Positions, bins and values of one chunk at the instant.
 pub struct Lab<const D: usize> {
     pub n: usize,
@@ -92,7 +137,6 @@ pub struct Lab<const D: usize> {
     /// Per species and component the slope of the reacted concentration by U.
     pub slopes: Vec<[f64; CHUNK]>,
     scratch: Box<Scratch<D>>,
-    bridge_noise: Noise<D>,
 }
 
 impl<const D: usize> Lab<D> {
@@ -107,12 +151,11 @@ impl<const D: usize> Lab<D> {
             simulated: zeros(program.n_components()),
             mixed: zeros(program.n_components()),
             is_mixed_known: false,
-            components: zeros(program.n_components()),
+            components: zeros(program.plan.components.len()),
             unreacted: zeros(n_species),
             species: zeros(n_species),
             slopes: zeros(n_species * program.n_components()),
             scratch: Scratch::new(),
-            bridge_noise: [[0.0; CHUNK]; D],
         })
     }
 
@@ -159,19 +202,8 @@ pub fn load<const D: usize>(
     }
     if let Instant::Between(between) = instant {
         let chunk_idx = (range.start / CHUNK) as u64;
-        let at = |step| Place { block_idx: block.idx, chunk_idx, step };
-        if let Some((step, leap)) = &between.before {
-            program.mover.draw_once(run.width, &run.walk, at(*step), &mut lab.scratch.noise);
-            leap.apply(&mut positions, &lab.scratch.noise);
-        }
-        program.mover.draw_once(run.width, &run.walk, at(between.step), &mut lab.scratch.noise);
-        program.mover.draw_once(run.width, &run.bridge, at(between.bridge), &mut lab.bridge_noise);
-        between.along.apply(&mut positions, &lab.scratch.noise);
-        between.across.apply(&mut positions, &lab.bridge_noise);
-        for (rule, positions) in program.rules.iter().zip(&mut positions) {
-            // A position that is not finite stops the step itself.
-            let _ = rule.apply(positions);
-        }
+        let draws = Draws { width: run.width, walk: &run.walk, bridge: &run.bridge };
+        between.place(program, &draws, (block.idx, chunk_idx), &mut positions, &mut lab.scratch.noise);
         program.grid.locate(positions.each_ref().map(|axis| &**axis), slots);
         lab.is_mixed_known = false;
     }
@@ -190,6 +222,7 @@ pub fn resolve<const D: usize>(
     instant: &Instant<D>,
     means: &Means,
     limits: &[f64],
+    immobile: &[Vec<f64>],
     needs: &Needs,
     lab: &mut Lab<D>,
 ) {
@@ -214,6 +247,11 @@ pub fn resolve<const D: usize>(
         if needs.any() {
             let (mixed, target) = (&lab.mixed[component][..n], &mut lab.components[component][..n]);
             total(&program.terms, columns, mixed, target);
+        }
+    }
+    for (target, bins) in lab.components[program.n_components()..].iter_mut().zip(immobile) {
+        for idx in 0..n {
+            target[idx] = bins[lab.slots[idx] as usize];
         }
     }
     chemistry::speciate(program, needs, n, &lab.components, &mut lab.unreacted, &mut lab.species);

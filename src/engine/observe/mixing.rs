@@ -48,7 +48,7 @@ struct Recipe {
 
 impl<'a, const D: usize> Mixing<'a, D> {
     pub fn new(program: &Program<D>, output: &Output, means: &'a Means, grid: Option<&'a Grid<D>>) -> Self {
-        let of = |idx: usize| (program.plan.species[idx].constant, program.plan.species[idx].terms.clone());
+        let of = |idx: usize| (program.species[idx].constant, program.species[idx].terms.clone());
         let recipes: Vec<Recipe> =
             pairs(output).into_iter().map(|(a, b)| Recipe { a: of(a), b: of(b) }).collect();
         let mut products = Vec::new();

@@ -19,7 +19,7 @@ use super::snapshot::{Snapshot, Values};
 use crate::plan::{Output, OutputKind, Plan, Quantity};
 use crate::state::grid::Grid;
 use chemistry::Needs;
-pub use lab::{Instant, Lab};
+pub use lab::{Draws, Instant, Lab};
 use look::{Look, Sums};
 use mixing::Mixing;
 use std::borrow::Cow;
@@ -50,7 +50,7 @@ pub fn observe<const D: usize>(
             Some((grid, means)) => Mixing::new(program, output, means, Some(grid)),
             None => Mixing::new(program, output, &means, None),
         });
-        tallies.push(Tally::new(program, output, mixing).ok_or_else(bad_bins)?);
+        tallies.push(Tally::new(program, output, mixing, &run.reactions.immobile).ok_or_else(bad_bins)?);
     }
     let needs = Needs::of(program, &due.outputs);
     let values = sum(run, instant, &means, &needs, &tallies);

@@ -30,6 +30,8 @@ pub enum Tally<'a, const D: usize> {
     },
     Total {
         species: Vec<usize>,
+        /// Amounts of what lives in bins, over the volume of a particle; `None` for what particles carry.
+        in_bins: Vec<Option<f64>>,
     },
     Mixing(Mixing<'a, D>),
     /// Collected apart, as nothing is summed.
@@ -82,7 +84,12 @@ impl Follow {
 
 impl<'a, const D: usize> Tally<'a, D> {
     /// `None` if the output's bins do not make a grid.
-    pub fn new(program: &Program<D>, output: &Output, mixing: Option<Mixing<'a, D>>) -> Option<Self> {
+    pub fn new(
+        program: &Program<D>,
+        output: &Output,
+        mixing: Option<Mixing<'a, D>>,
+        immobile: &[Vec<f64>],
+    ) -> Option<Self> {
         Some(match output.kind {
             OutputKind::Profile | OutputKind::Map => {
                 let follow = Follow::new(program);
@@ -91,7 +98,11 @@ impl<'a, const D: usize> Tally<'a, D> {
             OutputKind::Covariance => {
                 Self::Covariance { bins: Bins::new(program, output)?, pairs: pairs(output) }
             }
-            OutputKind::Total => Self::Total { species: species(output) },
+            OutputKind::Total => {
+                let species = species(output);
+                let in_bins = species.iter().map(|&idx| amount_in_bins(program, idx, immobile)).collect();
+                Self::Total { species, in_bins }
+            }
             OutputKind::Mixing => Self::Mixing(mixing?),
             OutputKind::Particles => Self::Particles,
         })
@@ -113,7 +124,7 @@ impl<'a, const D: usize> Tally<'a, D> {
                 bins.grid.n_slots() * (1 + species.len() * (1 + follow.n_components))
             }
             Self::Covariance { bins, pairs } => bins.grid.n_slots() * (1 + 2 * pairs.len()),
-            Self::Total { species } => species.len(),
+            Self::Total { species, .. } => species.len(),
             Self::Mixing(mixing) => mixing.n_sums(),
             Self::Particles => 0,
         }
@@ -141,7 +152,7 @@ impl<'a, const D: usize> Tally<'a, D> {
                 let both = pairs.iter().flat_map(|&(a, b)| [&lab.unreacted[a], &lab.unreacted[b]]);
                 add_binned(bins, lab, &both.collect::<Vec<_>>(), sums);
             }
-            Self::Total { species } => {
+            Self::Total { species, .. } => {
                 for (sum, &idx) in sums.iter_mut().zip(species) {
                     *sum += lane_sum(&lab.species[idx][..lab.n]);
                 }
@@ -173,9 +184,10 @@ impl<'a, const D: usize> Tally<'a, D> {
             Self::Covariance { bins, pairs } => {
                 Some(covariances(bins.grid.n_bins(), pairs.len(), first, second))
             }
-            Self::Total { .. } => {
+            Self::Total { in_bins, .. } => {
                 let volume = program.plan.particles.volume;
-                Some(Values::Total { amount: first.iter().map(|sum| volume * sum).collect() })
+                let sums = first.iter().zip(in_bins).map(|(sum, in_bins)| in_bins.unwrap_or(*sum));
+                Some(Values::Total { amount: sums.map(|sum| volume * sum).collect() })
             }
             Self::Mixing(mixing) => Some(Values::Mixing(mixing.states(first))),
             Self::Particles => None,
@@ -187,6 +199,24 @@ impl<'a, const D: usize> Tally<'a, D> {
 pub fn output_grid<const D: usize>(program: &Program<D>, output: &Output) -> Option<Grid<D>> {
     let bins = <[usize; D]>::try_from(&output.bins[..]).ok()?;
     program.grid.with_bins(bins)
+}
+
+/// Sum over bins of a species that is made of what lives there, as if particles carried it.
+fn amount_in_bins<const D: usize>(
+    program: &Program<D>,
+    species: usize,
+    immobile: &[Vec<f64>],
+) -> Option<f64> {
+    let recipe = &program.species[species];
+    let first = program.n_components();
+    if recipe.terms.is_empty() || recipe.terms.iter().any(|&(k, _)| k < first) {
+        return None;
+    }
+    let n_particles = program.plan.particles.count as f64;
+    let n_bins = program.grid.n_bins();
+    let of_term = |&(k, coefficient): &(usize, f64)| coefficient * lane_sum(&immobile[k - first][..n_bins]);
+    let sum: f64 = recipe.terms.iter().map(of_term).sum();
+    Some(n_particles * (recipe.constant + sum / n_bins as f64))
 }
 
 fn species(output: &Output) -> Vec<usize> {

@@ -4,7 +4,7 @@
 //! drift and their block of the dispersion tensor stay what they are.
 
 use super::Draft;
-use crate::plan::tape::{Operation, Tape};
+use crate::plan::tape::Operation;
 use crate::plan::{Output, OutputKind, Plan, Side};
 
 pub(super) fn run(draft: &mut Draft) {
@@ -26,14 +26,16 @@ pub(super) fn run(draft: &mut Draft) {
 fn is_idle(plan: &Plan, axis_idx: usize) -> bool {
     let axis = &plan.axes[axis_idx];
     let input = axis.index as u16;
-    let has_gradient = plan.components.iter().any(|component| reads(&component.initial, input));
+    let has_gradient = plan.components.iter().any(|component| reads(&component.initial.operations, input));
+    let kinetics = plan.chemistry.as_ref().and_then(|chemistry| chemistry.kinetics.as_ref());
+    let is_in_a_law = kinetics.is_some_and(|kinetics| reads(&kinetics.laws.operations, input));
     let is_closed = axis.low_side != Side::Open && axis.high_side != Side::Open;
     let is_shown = plan.outputs.iter().any(|output| shows(output, axis_idx));
-    !has_gradient && is_closed && !is_shown
+    !has_gradient && !is_in_a_law && is_closed && !is_shown
 }
 
-fn reads(tape: &Tape, input: u16) -> bool {
-    tape.operations.iter().any(|operation| matches!(operation, Operation::Input(column) if *column == input))
+fn reads(operations: &[Operation], input: u16) -> bool {
+    operations.iter().any(|operation| matches!(operation, Operation::Input(column) if *column == input))
 }
 
 fn shows(output: &Output, axis_idx: usize) -> bool {

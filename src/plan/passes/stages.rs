@@ -1,17 +1,21 @@
 //! Which work a step has: stages without effect go, the rest becomes one pass over memory.
 
 use super::Draft;
+use crate::plan::chemistry::Method;
 use crate::plan::{Plan, Stage, ZoneRate};
 
 pub(super) fn run(draft: &mut Draft) {
     let plan = &draft.plan;
     let moves = plan.walk.drift.iter().chain(&plan.walk.spread).any(|entry| *entry != 0.0);
     let mixes = exchanges(plan);
+    let reacts = plan.reacts_in_steps();
+    // Then no particle reacts before the means of all are known.
+    let is_coupled = reacts && (plan.mixing.is_some() || plan.has_immobile());
     let observes = !plan.outputs.is_empty();
     let mut notes = Vec::new();
-    if plan.mixing.is_none() {
+    if plan.mixing.is_none() && !is_coupled {
         notes.push(("mixing and averages in a step", "no mixing zones"));
-    } else if !mixes {
+    } else if !mixes && !is_coupled {
         notes.push((
             "mixing and averages in a step",
             "no zone with a finite rate: means are taken at outputs only",
@@ -23,16 +27,25 @@ pub(super) fn run(draft: &mut Draft) {
     if !observes {
         notes.push(("observation", "no outputs"));
     }
-    if plan.reactions.is_empty() {
+    if plan.reactions.is_empty() && plan.chemistry.is_none() {
         notes.push(("reaction", "no reactions"));
-    } else {
+    } else if !plan.reactions.is_empty() {
         notes.push((
             "reaction in a step",
             "instant: particles carry conserved totals, products are worked out at outputs",
         ));
     }
+    let kinetics = plan.chemistry.as_ref().and_then(|chemistry| chemistry.kinetics.as_ref());
+    if kinetics.is_some_and(|kinetics| kinetics.method == Method::Observed) {
+        let why = "first-order with constant rates: transport and reaction commute, exact for any step";
+        notes.push(("reaction in a step", why));
+    }
     notes.push(("neighbour search", "no kernel interaction"));
     let mut stages = match (moves, mixes) {
+        (true, _) if is_coupled => vec![Stage::FusedReact, Stage::FusedStep],
+        (false, _) if is_coupled => vec![Stage::FusedReact, Stage::Average],
+        (true, _) if reacts => vec![Stage::FusedStep],
+        (false, _) if reacts => vec![Stage::React],
         (true, true) => vec![Stage::FusedStep],
         (true, false) => vec![Stage::Move, Stage::Bound],
         (false, true) => vec![Stage::Mix],

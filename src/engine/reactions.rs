@@ -1,0 +1,351 @@
+//! Transport and reaction take turns: what is pending, what lives in bins, and the budget.
+//!
+//! Owns the order of these turns. May use `chemistry` and the passes of a run. It deliberately knows no
+//! rate law: a reactor does.
+
+use super::average::Means;
+use super::error::RunError;
+use super::observe::{Draws, Instant};
+use super::program::{Program, Role, Work, unsound};
+use super::react::{Added, Bench, Reaction, Span, add_work};
+use super::run::Run;
+use super::schedule::{Due, step_length};
+use super::{initial, parallel};
+use crate::chemistry::{Batch, Observed, Reactor, Scratch, Why, Work as Labour};
+use crate::diagnostic::precise;
+use crate::plan::chemistry::Splitting;
+use crate::state::particles::{Block, CHUNK};
+
+/// The chemistry of a run.
+pub struct Reactions {
+    reactor: Option<Reactor>,
+    observed: Option<Observed>,
+    is_symmetric: bool,
+    /// Over which the particles still have to react, at the positions that they have now.
+    spans: Vec<Span>,
+    step: Span,
+    /// Per immobile component and slot, the concentration in the fluid of the bin.
+    pub immobile: Vec<Vec<f64>>,
+    /// Per component.
+    pub added: Vec<Added>,
+    /// Of everything that was integrated.
+    pub labour: Labour,
+    /// Per column, whether a value went below zero in the last reaction.
+    negative: Vec<bool>,
+    /// Sums of the last reaction, as [`Program::n_reaction_sums`] says.
+    sums: Vec<f64>,
+}
+
+/// What the reactions of a group of blocks gave.
+#[derive(Default)]
+pub struct Yield {
+    added: Vec<Added>,
+    labour: Labour,
+    negative: Vec<bool>,
+}
+
+impl Yield {
+    /// Takes what a thread has gathered.
+    pub fn take(&mut self, bench: &mut Bench) {
+        self.added.clone_from(&bench.added);
+        self.negative.clone_from(&bench.negative);
+        self.labour = std::mem::take(&mut bench.labour);
+    }
+}
+
+impl Reactions {
+    pub fn new<const D: usize>(program: &Program<D>, blocks: &mut [Block<D>]) -> Result<Self, RunError> {
+        let plan = program.plan;
+        let reactor = match plan.reacts_in_steps() {
+            true => Reactor::new(plan).map_err(|what| unsound(&what))?,
+            false => None,
+        };
+        if reactor.is_some() {
+            for block in blocks {
+                block.memory.resize(block.n_particles, 0.0);
+            }
+        }
+        let splitting = plan.chemistry.as_ref().map(|chemistry| chemistry.splitting);
+        Ok(Self {
+            reactor,
+            observed: Observed::new(plan).map_err(|what| unsound(&what))?,
+            is_symmetric: splitting == Some(Splitting::Strang),
+            spans: Vec::new(),
+            step: Span { t: 0.0, dt: 0.0 },
+            immobile: initial::immobile(program)?,
+            added: vec![Added::default(); plan.components.len()],
+            labour: Labour::default(),
+            negative: Vec::new(),
+            sums: Vec::new(),
+        })
+    }
+
+    /// The same, to go another way from here.
+    pub fn copy(&self) -> Self {
+        Self {
+            reactor: self.reactor.clone(),
+            observed: self.observed.clone(),
+            is_symmetric: self.is_symmetric,
+            spans: self.spans.clone(),
+            step: self.step,
+            immobile: self.immobile.clone(),
+            added: self.added.clone(),
+            labour: Labour::default(),
+            negative: Vec::new(),
+            sums: Vec::new(),
+        }
+    }
+
+    /// The step that begins; with symmetric splitting its first half reacts before anything moves.
+    pub fn begin_step(&mut self, t: f64, dt: f64) {
+        self.step = Span { t, dt };
+        if self.is_symmetric && self.reactor.is_some() {
+            self.spans.push(Span { t, dt: 0.5 * dt });
+        }
+    }
+
+    /// What is left to react when everything has moved.
+    pub fn end_step(&mut self) {
+        if self.reactor.is_some() {
+            let Span { t, dt } = self.step;
+            let rest = if self.is_symmetric { Span { t: t + 0.5 * dt, dt: 0.5 * dt } } else { self.step };
+            self.spans.push(rest);
+        }
+    }
+
+    pub fn take_spans(&mut self) -> Vec<Span> {
+        std::mem::take(&mut self.spans)
+    }
+
+    /// The reaction of a pass; none if nothing reacts in it.
+    pub fn reaction<'a, const D: usize>(
+        &'a self,
+        program: &'a Program<'a, D>,
+        means: &'a Means,
+        spans: &'a [Span],
+    ) -> Option<Reaction<'a, D>> {
+        let reactor = self.reactor.as_ref().filter(|_| !spans.is_empty())?;
+        Some(Reaction { program, reactor, spans, means, immobile: &self.immobile })
+    }
+
+    /// Takes the sums and yields of a pass over all groups, in their order.
+    pub fn settle<'y, const D: usize>(
+        &mut self,
+        program: &Program<D>,
+        sums: Vec<f64>,
+        yields: impl Iterator<Item = &'y Yield>,
+    ) {
+        self.negative.clear();
+        self.negative.resize(program.n_columns(), false);
+        for group in yields {
+            self.added.iter_mut().zip(&group.added).for_each(|(sum, part)| sum.add(*part));
+            self.negative.iter_mut().zip(&group.negative).for_each(|(any, own)| *any |= own);
+            add_work(&mut self.labour, &group.labour);
+        }
+        let stride = program.n_reaction_sums();
+        let n_bins = program.grid.n_bins();
+        let mean = program.plan.particles.count as f64 / n_bins as f64;
+        for (idx, bins) in self.immobile.iter_mut().enumerate() {
+            let changes = sums.iter().skip(idx).step_by(stride);
+            for (bin, change) in bins[..n_bins].iter_mut().zip(changes) {
+                // What is used up may miss zero by rounding.
+                *bin = (*bin + change / mean).max(0.0);
+            }
+        }
+        self.sums = sums;
+    }
+
+    /// A failure of the chemistry in the words of the plan.
+    pub fn explain<const D: usize>(&self, program: &Program<D>, why: Why) -> String {
+        let name = |idx: usize| program.plan.components.get(idx).map_or("?", |component| &component.name);
+        match why {
+            Why::StepTooSmall { t, step } => format!(
+                "at {} s a sub-step of {} s is still too long for the tolerance",
+                precise(t),
+                precise(step)
+            ),
+            Why::NotFinite { component } => {
+                format!("the rate of `{}` is not a finite number", name(component))
+            }
+            Why::Negative { component, value } => {
+                format!("`{}` would become negative ({})", name(component), precise(value))
+            }
+            Why::NoEquilibrium { residual } => {
+                format!("no equilibrium is found (relative residual {})", precise(residual))
+            }
+        }
+    }
+}
+
+impl<const D: usize> Run<'_, D> {
+    /// Brings everything up to date for somebody who looks, and says how species follow from components
+    /// then. Without reactions in steps a look-through does as well, and costs less.
+    pub fn look_at(&mut self, t: f64, steps: u64) -> Result<(), RunError> {
+        if let Some(recipes) = self.reactions.observed.as_ref().and_then(|observed| observed.recipes(t)) {
+            self.program.species = recipes;
+        }
+        if self.reactions.reactor.is_some() { self.settle_pending(steps.saturating_sub(1)) } else { Ok(()) }
+    }
+
+    /// Does what the step before has left to do.
+    pub fn settle_pending(&mut self, step: u64) -> Result<(), RunError> {
+        let work = Work { mixes: self.pending.is_some(), ..Work::default() };
+        if self.reactions.spans.is_empty() {
+            let leap = self.program.mover.leap(0.0, 0.0);
+            return if work.mixes { self.pass(work, step, leap, &[]) } else { Ok(()) };
+        }
+        let work = Work { reacts: true, ..work };
+        if self.program.is_coupled() {
+            return self.react_in_bins(work, step);
+        }
+        let spans = self.reactions.take_spans();
+        self.pass(work, step, self.program.mover.leap(0.0, 0.0), &spans)
+    }
+
+    /// One reaction after the other, each with the means and bins as the one before left them.
+    pub fn react_in_bins(&mut self, work: Work, step: u64) -> Result<(), RunError> {
+        let still = self.program.mover.leap(0.0, 0.0);
+        let mut mixes = work.mixes;
+        let spans = self.reactions.take_spans();
+        if spans.is_empty() && mixes {
+            return self.pass(Work { mixes, ..Work::default() }, step, still, &[]);
+        }
+        for span in spans {
+            if !self.is_averaged {
+                self.pass(Work { averages: true, ..Work::default() }, step, still, &[])?;
+            }
+            self.pass(Work { mixes, reacts: true, ..Work::default() }, step, still, &[span])?;
+            mixes = false;
+            self.repair();
+            self.react_without_particles(span, step)?;
+        }
+        Ok(())
+    }
+
+    /// Zones below zero, at the cost of the others in their bin.
+    ///
+    /// - Equation: `W ← max(W, 0) S / S₊`, `S = Σ W`, `S₊ = Σ max(W, 0)` over the bin.
+    /// - Symbols: `W` the value of one zone in one particle.
+    /// - Range: `S ≥ 0`, since it is the sum of concentrations of whole particles; if rounding makes it
+    ///   negative all particles get its mean.
+    /// - Source: methods, section 7.2: clip, and redistribute inside the bin. An instant zone is not
+    ///   stored, and what it gives up is taken from the mean of the others, which is its own.
+    /// - Shape: all particles; the sum over each bin stays.
+    fn repair(&mut self) {
+        let program = &self.program;
+        let columns: Vec<usize> = (0..program.n_columns()).filter(|&c| self.reactions.negative[c]).collect();
+        if columns.is_empty() {
+            return;
+        }
+        let n_immobile = self.reactions.immobile.len();
+        let stride = program.n_reaction_sums();
+        let n_bins = program.grid.n_bins();
+        // Factor and constant per slot: one of them is zero.
+        let cure = |column: usize| -> Vec<(f64, f64)> {
+            let of_slot = |(slot, sums): (usize, &[f64])| match (sums[0], sums[1], self.means.counts[slot]) {
+                _ if slot == n_bins => (1.0, 0.0),
+                (sum, positive, _) if sum >= 0.0 && positive > 0.0 => (sum / positive, 0.0),
+                (sum, _, n) => (0.0, if n > 0.0 { sum / n } else { 0.0 }),
+            };
+            let own = self.reactions.sums.chunks(stride).map(|sums| &sums[n_immobile + 2 * column..][..2]);
+            own.enumerate().map(of_slot).collect()
+        };
+        let cures: Vec<(usize, Vec<(f64, f64)>)> = columns.into_iter().map(|c| (c, cure(c))).collect();
+        parallel::for_each(&mut self.blocks.iter_mut().collect::<Vec<_>>(), &|_, block| {
+            let mut slots = [0; CHUNK];
+            for range in block.chunks() {
+                let slots = &mut slots[..range.len()];
+                program.grid.locate(block.positions.each_ref().map(|axis| &axis[range.clone()]), slots);
+                for (column, cure) in &cures {
+                    let values = &mut block.columns[*column][range.clone()];
+                    for (value, &slot) in values.iter_mut().zip(&*slots) {
+                        let (factor, constant) = cure[slot as usize];
+                        *value = if (slot as usize) < n_bins {
+                            value.max(0.0) * factor + constant
+                        } else {
+                            *value
+                        };
+                    }
+                }
+            }
+        });
+    }
+
+    /// What lives in a bin without particles reacts with nothing but itself.
+    fn react_without_particles(&mut self, span: Span, step: u64) -> Result<(), RunError> {
+        let (program, reactions) = (&self.program, &mut self.reactions);
+        let (Some(reactor), false) = (&reactions.reactor, reactions.immobile.is_empty()) else {
+            return Ok(());
+        };
+        let n_bins = program.grid.n_bins();
+        let empty: Vec<usize> = (0..n_bins).filter(|&bin| self.means.counts[bin] == 0.0).collect();
+        if empty.is_empty() {
+            return Ok(());
+        }
+        let mut places = [const { Vec::new() }; 3];
+        for (rank, axis) in program.plan.axes.iter().enumerate() {
+            places[axis.index] = empty.iter().map(|&bin| program.grid.centre(bin)[rank]).collect();
+        }
+        let mut values = vec![vec![0.0; empty.len()]; program.n_components()];
+        values.extend(reactions.immobile.iter().map(|bins| empty.iter().map(|&bin| bins[bin]).collect()));
+        let positions = places.each_ref().map(|axis: &Vec<f64>| &axis[..]);
+        let mut memory = vec![0.0_f32; empty.len()];
+        let mut scratch = Scratch::default();
+        for start in (0..empty.len()).step_by(CHUNK) {
+            let range = start..(start + CHUNK).min(empty.len());
+            let mut columns: Vec<&mut [f64]> = values.iter_mut().map(|c| &mut c[range.clone()]).collect();
+            let batch = Batch {
+                positions: positions.map(|axis| if axis.is_empty() { axis } else { &axis[range.clone()] }),
+                t: span.t,
+                dt: span.dt,
+                components: &mut columns,
+                memory: &mut memory[range.clone()],
+            };
+            if let Err(failure) = reactor.react(batch, &mut scratch) {
+                let what = format!("in a bin without particles: {}", reactions.explain(program, failure.why));
+                return Err(RunError::Chemistry { step: step.max(1), particle: 0, what });
+            }
+        }
+        let mean = program.plan.particles.count as f64 / n_bins as f64;
+        for (idx, bins) in reactions.immobile.iter_mut().enumerate() {
+            for (&bin, &after) in empty.iter().zip(&values[program.n_components() + idx]) {
+                let change = (after - bins[bin]) * mean;
+                reactions.added[program.n_components() + idx].add(Added { sum: change, size: change.abs() });
+                bins[bin] = after.max(0.0);
+            }
+        }
+        Ok(())
+    }
+
+    /// The state at a time within the next step, if what reacts has to be taken there: a copy that goes
+    /// part of the step. Otherwise nothing, and a look-through does.
+    pub fn ahead(&self, due: &Due) -> Result<Option<Self>, RunError> {
+        if self.reactions.reactor.is_none() || due.fraction == 0.0 {
+            return Ok(None);
+        }
+        let plan_step = step_length(&self.program.plan.time, due.steps);
+        let Instant::Between(between) = self.instant(due) else { return Ok(None) };
+        let mut ahead = self.copy();
+        let t = due.steps as f64 * self.program.plan.time.step;
+        ahead.reactions.begin_step(t, due.fraction * plan_step);
+        if ahead.reactions.is_symmetric {
+            ahead.settle_pending(due.steps)?;
+        }
+        let program = &self.program;
+        let draws = Draws { width: self.width, walk: &self.walk, bridge: &self.bridge };
+        parallel::for_each(&mut ahead.blocks.iter_mut().collect::<Vec<_>>(), &|_, block| {
+            between.carry(program, &draws, block);
+        });
+        ahead.is_averaged = false;
+        if program.is_coupled() {
+            let still = program.mover.leap(0.0, 0.0);
+            ahead.pass(Work { averages: true, ..Work::default() }, due.steps, still, &[])?;
+        }
+        if program.roles.iter().any(|role| !matches!(role, Role::Fixed)) {
+            ahead.pending = Some(between.decays.clone());
+        }
+        ahead.reactions.end_step();
+        ahead.settle_pending(due.steps)?;
+        Ok(Some(ahead))
+    }
+}
