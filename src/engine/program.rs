@@ -111,6 +111,10 @@ impl<'a, const D: usize> Program<'a, D> {
         self.plan.mixing.is_some()
     }
 
+    pub fn has_equilibrium(&self) -> bool {
+        self.plan.chemistry.as_ref().is_some_and(|chemistry| chemistry.equilibrium.is_some())
+    }
+
     /// Sums per slot that a reaction leaves: one for each immobile component, then two per column if there
     /// are zones, of its values and of those above zero.
     pub fn n_reaction_sums(&self) -> usize {

@@ -13,13 +13,16 @@ use super::schedule::{Due, step_length};
 use super::{initial, parallel};
 use crate::chemistry::{Batch, Observed, Reactor, Scratch, Why, Work as Labour};
 use crate::diagnostic::precise;
+use crate::plan::Plan;
 use crate::plan::chemistry::Splitting;
 use crate::state::particles::{Block, CHUNK};
+use std::sync::{Mutex, PoisonError};
 
 /// The chemistry of a run.
 pub struct Reactions {
     reactor: Option<Reactor>,
     observed: Option<Observed>,
+    pub speciation: Option<Speciation>,
     is_symmetric: bool,
     /// Over which the particles still have to react, at the positions that they have now.
     spans: Vec<Span>,
@@ -34,6 +37,46 @@ pub struct Reactions {
     negative: Vec<bool>,
     /// Sums of the last reaction, as [`Program::n_reaction_sums`] says.
     sums: Vec<f64>,
+}
+
+/// Equilibrium as observations see it.
+pub struct Speciation {
+    pub reactor: Reactor,
+    /// What is in equilibrium.
+    pub species: Vec<usize>,
+    /// The first particle without equilibrium.
+    failure: Mutex<Option<(u64, Why)>>,
+}
+
+impl Clone for Speciation {
+    fn clone(&self) -> Self {
+        Self { reactor: self.reactor.clone(), species: self.species.clone(), failure: Mutex::default() }
+    }
+}
+
+impl Speciation {
+    fn new(plan: &Plan) -> Result<Option<Self>, String> {
+        let equilibrium = plan.chemistry.as_ref().and_then(|chemistry| chemistry.equilibrium.as_ref());
+        let (Some(equilibrium), Some(reactor)) = (equilibrium, Reactor::new(plan)?) else { return Ok(None) };
+        let primaries = equilibrium.primaries.iter().map(|primary| primary.species);
+        let secondaries = equilibrium.secondaries.iter().map(|secondary| secondary.species);
+        let minerals = equilibrium.minerals.iter().map(|mineral| mineral.species);
+        let species = primaries.chain(secondaries).chain(minerals).collect();
+        Ok(Some(Self { reactor, species, failure: Mutex::default() }))
+    }
+
+    /// Keeps the failure of the first particle.
+    pub fn fail(&self, particle: u64, why: Why) {
+        let mut kept = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
+        if kept.is_none_or(|(first, _)| particle < first) {
+            *kept = Some((particle, why));
+        }
+    }
+
+    /// What was kept.
+    pub fn failure(&self) -> Option<(u64, Why)> {
+        *self.failure.lock().unwrap_or_else(PoisonError::into_inner)
+    }
 }
 
 /// What the reactions of a group of blocks gave.
@@ -69,6 +112,7 @@ impl Reactions {
         Ok(Self {
             reactor,
             observed: Observed::new(plan).map_err(|what| unsound(&what))?,
+            speciation: Speciation::new(plan).map_err(|what| unsound(&what))?,
             is_symmetric: splitting == Some(Splitting::Strang),
             spans: Vec::new(),
             step: Span { t: 0.0, dt: 0.0 },
@@ -85,6 +129,7 @@ impl Reactions {
         Self {
             reactor: self.reactor.clone(),
             observed: self.observed.clone(),
+            speciation: self.speciation.clone(),
             is_symmetric: self.is_symmetric,
             spans: self.spans.clone(),
             step: self.step,

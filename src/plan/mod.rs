@@ -17,6 +17,7 @@ pub mod limits;
 mod lower;
 pub mod passes;
 pub mod tape;
+pub mod time_scales;
 
 pub use crate::scenario::{OutputKind, Placement, Side};
 pub use compile::{Compiled, Options, Selection, compile, hash};

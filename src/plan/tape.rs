@@ -3,6 +3,7 @@
 //! Owns the tape and its evaluation. May use `maths`. It deliberately has no branches: `if` selects.
 
 mod check;
+pub mod dual;
 mod evaluate;
 
 pub use crate::maths::operator::{Binary, Unary};

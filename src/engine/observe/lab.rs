@@ -136,6 +136,11 @@ pub struct Lab<const D: usize> {
     pub species: Vec<[f64; CHUNK]>,
     /// Per species and component the slope of the reacted concentration by U.
     pub slopes: Vec<[f64; CHUNK]>,
+    /// Number of the first particle.
+    pub first: u64,
+    /// Per species, where some are in equilibrium.
+    speciated: Vec<[f64; CHUNK]>,
+    solver: crate::chemistry::Scratch,
     scratch: Box<Scratch<D>>,
 }
 
@@ -155,6 +160,9 @@ impl<const D: usize> Lab<D> {
             unreacted: zeros(n_species),
             species: zeros(n_species),
             slopes: zeros(n_species * program.n_components()),
+            first: 0,
+            speciated: zeros(if program.has_equilibrium() { n_species } else { 0 }),
+            solver: crate::chemistry::Scratch::default(),
             scratch: Scratch::new(),
         })
     }
@@ -183,6 +191,7 @@ pub fn load<const D: usize>(
     let program = &run.program;
     let n = range.len();
     lab.n = n;
+    lab.first = block.first() + range.start as u64;
     for axis in 0..D {
         lab.positions[axis][..n].copy_from_slice(&block.positions[axis][range.clone()]);
     }
@@ -218,19 +227,17 @@ fn sees_mean<const D: usize>(program: &Program<D>) -> bool {
 /// From carried values to concentrations, once the means of the instant are known.
 #[inline(always)]
 pub fn resolve<const D: usize>(
-    program: &Program<D>,
+    run: &Run<D>,
     instant: &Instant<D>,
     means: &Means,
-    limits: &[f64],
-    immobile: &[Vec<f64>],
     needs: &Needs,
     lab: &mut Lab<D>,
 ) {
-    let n = lab.n;
+    let (program, n) = (&run.program, lab.n);
     if let Instant::Between(between) = instant {
         let (slots, mut columns) = (&lab.slots[..n], mix::cut(&mut lab.columns, 0..n));
         // A value out of range is reported by the step itself.
-        mix::relax(program, means, &between.decays, slots, &mut columns, &mut lab.mixed, limits);
+        mix::relax(program, means, &between.decays, slots, &mut columns, &mut lab.mixed, &run.limits);
         lab.is_mixed_known = sees_mean(program);
     }
     let n_slots = program.roles.len();
@@ -249,14 +256,32 @@ pub fn resolve<const D: usize>(
             total(&program.terms, columns, mixed, target);
         }
     }
-    for (target, bins) in lab.components[program.n_components()..].iter_mut().zip(immobile) {
+    for (target, bins) in lab.components[program.n_components()..].iter_mut().zip(&run.reactions.immobile) {
         for idx in 0..n {
             target[idx] = bins[lab.slots[idx] as usize];
         }
     }
     chemistry::speciate(program, needs, n, &lab.components, &mut lab.unreacted, &mut lab.species);
+    if needs.any() {
+        equilibrate(run, lab);
+    }
     if needs.slopes {
         chemistry::slopes(program, needs, n, &lab.unreacted, &mut lab.slopes);
+    }
+}
+
+/// Concentrations of what is in equilibrium. A failure is kept for the end of the observation.
+#[inline(never)] // Rare beside the rest, and a solver of its own.
+fn equilibrate<const D: usize>(run: &Run<D>, lab: &mut Lab<D>) {
+    let Some(speciation) = &run.reactions.speciation else { return };
+    let n = lab.n;
+    let components: Vec<&[f64]> = lab.components.iter().map(|column| &column[..n]).collect();
+    let mut species: Vec<&mut [f64]> = lab.speciated.iter_mut().map(|column| &mut column[..n]).collect();
+    if let Err(failure) = speciation.reactor.speciate(&components, &mut species, &mut lab.solver) {
+        speciation.fail(lab.first + failure.particle as u64, failure.why);
+    }
+    for &idx in &speciation.species {
+        lab.species[idx][..n].copy_from_slice(&lab.speciated[idx][..n]);
     }
 }
 

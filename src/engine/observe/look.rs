@@ -79,8 +79,7 @@ impl<const D: usize> pulp::NullaryFnOnce for Look<'_, D> {
         let Self { run, instant, resolved, block, range, lab, sums, target } = self;
         lab::load(run, instant, block, range, lab);
         if let Some((means, needs)) = resolved {
-            let immobile = &run.reactions.immobile;
-            lab::resolve(&run.program, instant, means, &run.limits, immobile, needs, lab);
+            lab::resolve(run, instant, means, needs, lab);
         }
         sums.add(lab, target);
     }

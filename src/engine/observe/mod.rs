@@ -13,6 +13,7 @@ use super::average::{Means, blocks_per_group};
 use super::error::RunError;
 use super::parallel;
 use super::program::unsound;
+use super::reactions::Speciation;
 use super::run::Run;
 use super::schedule::Due;
 use super::snapshot::{Snapshot, Values};
@@ -54,6 +55,10 @@ pub fn observe<const D: usize>(
     }
     let needs = Needs::of(program, &due.outputs);
     let values = sum(run, instant, &means, &needs, &tallies);
+    if let Some((particle, why)) = run.reactions.speciation.as_ref().and_then(Speciation::failure) {
+        let what = run.reactions.explain(program, why);
+        return Err(RunError::Chemistry { step: due.steps, particle, what });
+    }
     let snapshot = |(&output_idx, values)| {
         let output = &program.plan.outputs[output_idx];
         let values = listed_only(values, output);

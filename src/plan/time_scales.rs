@@ -1,0 +1,197 @@
+//! How fast a scene reacts, from its laws and its values alone.
+//!
+//! Owns the states that are looked at and the numbers found there. May use the tape. It deliberately runs
+//! no particle: a few states, and a coarse implicit course from each to the end of the run.
+
+use super::chemistry::Kinetics;
+use super::tape::dual::differentiate;
+use super::{Axis, Plan};
+
+/// Points along each axis at which initial values are taken.
+const POINTS: usize = 17;
+/// States from which courses start.
+const MAX_STARTS: usize = 6;
+/// Each implicit step of a course is this much longer than the one before.
+const GROWTH: f64 = 3.0;
+/// The first one, against the fastest reaction.
+const FIRST_STEP: f64 = 1e-3;
+
+/// The time scales of a plan's kinetics.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TimeScales {
+    /// Per reaction the largest |∇r · ν| met, 1/s: how fast it would relax by itself.
+    pub rates: Vec<f64>,
+    /// The reaction with the largest.
+    pub fastest: usize,
+    /// The smallest above zero, 1/s.
+    pub slowest_rate: f64,
+}
+
+impl TimeScales {
+    /// 1/s
+    pub fn fastest_rate(&self) -> f64 {
+        self.rates[self.fastest]
+    }
+
+    /// Fastest against slowest reaction.
+    pub fn stiffness(&self) -> f64 {
+        self.fastest_rate() / self.slowest_rate
+    }
+
+    /// `None` if nothing reacts in steps, if what reacts hangs on an equilibrium, or if a rate at the
+    /// initial values is no number.
+    pub fn of(plan: &Plan) -> Option<Self> {
+        let chemistry = plan.chemistry.as_ref().filter(|chemistry| chemistry.equilibrium.is_none())?;
+        let kinetics = chemistry.kinetics.as_ref()?;
+        let network = Network { plan, kinetics };
+        let states = network.states();
+        let mut rates = vec![0.0_f64; kinetics.reactions.len()];
+        for (position, state) in &states {
+            network.course(*position, state.clone(), &mut rates);
+        }
+        let fastest = (0..rates.len()).max_by(|&a, &b| rates[a].total_cmp(&rates[b]))?;
+        let slowest_rate = rates.iter().copied().filter(|rate| *rate > 0.0).fold(f64::INFINITY, f64::min);
+        (rates[fastest] > 0.0).then_some(Self { rates, fastest, slowest_rate })
+    }
+}
+
+struct Network<'p> {
+    plan: &'p Plan,
+    kinetics: &'p Kinetics,
+}
+
+type State = ([f64; 3], Vec<f64>);
+
+impl Network<'_> {
+    /// States that particles may have: where a component is largest at the beginning, the mean of all, and
+    /// every component at its largest, as mixing might bring them together.
+    fn states(&self) -> Vec<State> {
+        let samples: Vec<State> = sample_points(&self.plan.axes)
+            .into_iter()
+            .map(|[x, y, z]| {
+                let of = |c: &super::Component| c.initial.evaluate(&[x, y, z, 0.0]).max(0.0);
+                ([x, y, z], self.plan.components.iter().map(of).collect())
+            })
+            .collect();
+        let n = self.plan.components.len();
+        let column = |k: usize| samples.iter().map(move |(_, values)| values[k]);
+        let mean = (0..n).map(|k| column(k).sum::<f64>() / samples.len() as f64).collect();
+        let largest = (0..n).map(|k| column(k).fold(0.0, f64::max)).collect();
+        let middle = samples[samples.len() / 2].0;
+        let mut states = vec![(middle, largest), (middle, mean)];
+        for k in 0..n {
+            let place = (0..samples.len()).max_by(|&a, &b| samples[a].1[k].total_cmp(&samples[b].1[k]));
+            let Some(place) = place else { continue };
+            if states.len() < MAX_STARTS && !states.iter().any(|(_, values)| *values == samples[place].1) {
+                states.push(samples[place].clone());
+            }
+        }
+        states
+    }
+
+    /// Concentrations of all species.
+    fn species(&self, components: &[f64]) -> Vec<f64> {
+        let of = |species: &super::Species| {
+            let terms = species.terms.iter().map(|&(k, coefficient)| coefficient * components[k]);
+            (species.constant + terms.sum::<f64>()).max(0.0)
+        };
+        self.plan.species.iter().map(of).collect()
+    }
+
+    /// Rates, and their derivatives by components.
+    fn rates(&self, position: [f64; 3], t: f64, components: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
+        let [x, y, z] = position;
+        let mut inputs = vec![x, y, z, t];
+        inputs.extend(self.species(components));
+        let n_species = self.plan.species.len();
+        let (values, slopes) = differentiate(&self.kinetics.laws.operations, &inputs, 4, n_species);
+        let registers = self.kinetics.laws.rates.iter().map(|&register| usize::from(register));
+        let by_component = |register: usize| {
+            let mut slope = vec![0.0; components.len()];
+            for (s, species) in self.plan.species.iter().enumerate() {
+                let own = slopes[register * n_species + s];
+                if own != 0.0 {
+                    species.terms.iter().for_each(|&(k, coefficient)| slope[k] += own * coefficient);
+                }
+            }
+            slope
+        };
+        (registers.clone().map(|register| values[register]).collect(), registers.map(by_component).collect())
+    }
+
+    /// Follows a state to the end of the run with linearly implicit Euler steps of growing length, and
+    /// keeps the largest |∇r · ν| of each reaction.
+    fn course(&self, position: [f64; 3], mut y: Vec<f64>, largest: &mut [f64]) {
+        let duration = self.plan.time.duration;
+        let (mut t, mut step) = (0.0, None);
+        let n = y.len();
+        while t < duration {
+            let (rates, slopes) = self.rates(position, t, &y);
+            let mut fastest = 0.0_f64;
+            let mut f = vec![0.0; n];
+            let mut j = vec![0.0; n * n];
+            for (k, reaction) in self.kinetics.reactions.iter().enumerate() {
+                let own: f64 = reaction.changes.iter().map(|&(i, nu)| nu * slopes[k][i]).sum();
+                if own.is_finite() {
+                    largest[k] = largest[k].max(own.abs());
+                    fastest = fastest.max(own.abs());
+                }
+                for &(i, nu) in &reaction.changes {
+                    f[i] += nu * rates[k];
+                    (0..n).for_each(|column| j[i * n + column] += nu * slopes[k][column]);
+                }
+            }
+            let h = step.unwrap_or(if fastest > 0.0 { FIRST_STEP / fastest } else { duration });
+            let h = h.max(1e-12 * duration).min(duration - t);
+            let Some(change) = implicit(&j, &f, h) else { return };
+            y.iter_mut().zip(change).for_each(|(y, change)| *y = (*y + change).max(0.0));
+            t += h;
+            step = Some(h * GROWTH);
+        }
+    }
+}
+
+/// `(I − hJ) δ = h f` by elimination with column pivots; `None` if it has no answer in numbers.
+fn implicit(j: &[f64], f: &[f64], h: f64) -> Option<Vec<f64>> {
+    let n = f.len();
+    let mut rows: Vec<Vec<f64>> = (0..n)
+        .map(|row| {
+            let mut line: Vec<f64> = (0..n).map(|column| -h * j[row * n + column]).collect();
+            line[row] += 1.0;
+            line.push(h * f[row]);
+            line
+        })
+        .collect();
+    for pivot in 0..n {
+        let best = (pivot..n).max_by(|&a, &b| rows[a][pivot].abs().total_cmp(&rows[b][pivot].abs()))?;
+        rows.swap(pivot, best);
+        let head = rows[pivot].clone();
+        for row in rows.iter_mut().skip(pivot + 1) {
+            let factor = row[pivot] / head[pivot];
+            if factor != 0.0 {
+                (pivot..=n).for_each(|column| row[column] -= factor * head[column]);
+            }
+        }
+    }
+    let mut solution = vec![0.0; n];
+    for row in (0..n).rev() {
+        let known: f64 = (row + 1..n).map(|column| rows[row][column] * solution[column]).sum();
+        solution[row] = (rows[row][n] - known) / rows[row][row];
+    }
+    solution.iter().all(|value| value.is_finite()).then_some(solution)
+}
+
+/// Centres of a coarse grid over the domain; axes that were left out are at 0.
+fn sample_points(axes: &[Axis]) -> Vec<[f64; 3]> {
+    let mut points = vec![[0.0; 3]];
+    let per_axis = if axes.len() > 2 { POINTS / 2 } else { POINTS };
+    for axis in axes {
+        let along = |idx: usize| axis.low + (axis.high - axis.low) * (idx as f64 + 0.5) / per_axis as f64;
+        let spread = |mut point: [f64; 3], idx: usize| {
+            point[axis.index] = along(idx);
+            point
+        };
+        points = points.iter().flat_map(|&point| (0..per_axis).map(move |idx| spread(point, idx))).collect();
+    }
+    points
+}
