@@ -2,4 +2,5 @@
 //!
 //! Owns formulas, their arguments and their sources. May use the words only. It deliberately runs nothing.
 
+pub mod rate;
 pub mod reference;

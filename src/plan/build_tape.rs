@@ -14,7 +14,7 @@ const MAX_OPERATIONS: usize = 65_000;
 /// Compiles an expression over x, y, z, t; names of species stand for their initial
 /// concentrations. `None` if it needs more operations than a tape can hold.
 pub fn build_tape(expr: &Expr, species: &[Species]) -> Option<Tape> {
-    let mut builder = Builder { operations: Vec::new(), known: BTreeMap::new(), species };
+    let mut builder = Builder { operations: Vec::new(), known: BTreeMap::new(), initial: Some(species) };
     let result = builder.add_expr(expr)?;
     if usize::from(result) + 1 != builder.operations.len() {
         // The last register is the result: repeat a shared one at the end.
@@ -24,10 +24,22 @@ pub fn build_tape(expr: &Expr, species: &[Species]) -> Option<Tape> {
     Some(Tape { operations: builder.operations })
 }
 
+/// Compiles rates over x, y, z, t and the current concentrations of all species, as one program with a
+/// register for each. `None` if it needs more operations than a tape can hold.
+pub fn build_rates(rates: &[Expr]) -> Option<(Vec<Operation>, Vec<Register>)> {
+    let mut builder = Builder { operations: Vec::new(), known: BTreeMap::new(), initial: None };
+    let registers = rates.iter().map(|rate| builder.add_expr(rate)).collect::<Option<_>>()?;
+    Some((builder.operations, registers))
+}
+
+/// Column of the first species among the inputs of rates.
+pub const SPECIES_INPUT: u16 = TIME_INPUT + 1;
+
 struct Builder<'s> {
     operations: Vec<Operation>,
     known: BTreeMap<Key, Register>,
-    species: &'s [Species],
+    /// Names of species stand for the initial concentrations of these, or for current ones.
+    initial: Option<&'s [Species]>,
 }
 
 /// An operation with the bits of its constant, so that equal ones are found.
@@ -46,11 +58,11 @@ impl Builder<'_> {
             Node::Constant(value) => self.add(Operation::Constant(*value)),
             Node::Axis(index) => self.add(Operation::Input(u16::try_from(*index).ok()?)),
             Node::Time => self.add(Operation::Input(TIME_INPUT)),
-            Node::Species(idx) => {
+            Node::Species(idx) => match self.initial {
                 // Initial concentrations have no circles: `scenario` refused them.
-                let species = self.species;
-                self.add_expr(&species[*idx].initial)
-            }
+                Some(species) => self.add_expr(&species[*idx].initial),
+                None => self.add(Operation::Input(SPECIES_INPUT.checked_add(u16::try_from(*idx).ok()?)?)),
+            },
             Node::Unary(operator, a) => {
                 let a = self.add_expr(a)?;
                 self.add(Operation::Unary(*operator, a))

@@ -10,6 +10,7 @@ impl Plan {
     pub fn check(&self) -> Result<(), String> {
         self.check_geometry()?;
         self.check_fields()?;
+        self.check_chemistry()?;
         self.check_mixing()?;
         self.outputs.iter().try_for_each(|output| self.check_output(output))
     }
@@ -99,18 +100,23 @@ impl Plan {
     }
 }
 
-fn require(is_right: bool, otherwise: impl FnOnce() -> String) -> Result<(), String> {
+pub(super) fn require(is_right: bool, otherwise: impl FnOnce() -> String) -> Result<(), String> {
     if is_right { Ok(()) } else { Err(otherwise()) }
 }
 
 /// Registers point backwards; inputs are x, y, z, t.
 fn check_tape(tape: &Tape) -> Result<(), String> {
-    require(!tape.operations.is_empty(), || "an empty tape".into())?;
-    for (idx, operation) in tape.operations.iter().enumerate() {
+    check_operations(&tape.operations, usize::from(super::build_tape::TIME_INPUT) + 1)
+}
+
+/// Registers point backwards, inputs to one of so many columns.
+pub(super) fn check_operations(operations: &[Operation], n_inputs: usize) -> Result<(), String> {
+    require(!operations.is_empty(), || "an empty tape".into())?;
+    for (idx, operation) in operations.iter().enumerate() {
         let is_before = |register: u16| usize::from(register) < idx;
         let is_right = match *operation {
             Operation::Constant(_) => true,
-            Operation::Input(column) => column <= super::build_tape::TIME_INPUT,
+            Operation::Input(column) => usize::from(column) < n_inputs,
             Operation::Unary(_, a) => is_before(a),
             Operation::Binary(_, a, b) => is_before(a) && is_before(b),
             Operation::Select(a, b, c) => is_before(a) && is_before(b) && is_before(c),

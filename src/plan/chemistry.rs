@@ -7,6 +7,7 @@
 //! primary species are such combinations, and the concentrations follow by speciation.
 
 use super::tape::{Operation, Register};
+pub use crate::scenario::{Activity, Integrator, Splitting};
 use serde::{Deserialize, Serialize};
 
 /// Chemistry beyond complete instant reactions.
@@ -20,16 +21,9 @@ pub struct Chemistry {
     /// Concentration per component, mol/m³ or kg/m³, below which the relative tolerance stops to hold.
     pub floors: Vec<f64>,
     pub splitting: Splitting,
-}
-
-/// The order in which transport and reaction take turns.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Splitting {
-    /// Transport, then reaction over the whole step: first order.
-    Lie,
-    /// Half a reaction, transport, half a reaction: second order.
-    Strang,
+    /// What the scene asks for; [`Kinetics::method`] is what is done.
+    #[serde(default)]
+    pub integrator: Integrator,
 }
 
 /// Reactions at finite rates.
@@ -132,20 +126,6 @@ pub struct Mineral {
     pub ln_solubility: f64,
     /// `(primary index, ν)`: what dissolving one unit gives.
     pub coefficients: Vec<(usize, f64)>,
-}
-
-/// Activity coefficients from the ionic strength `I = ½ Σ z² c`, in mol/L.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Activity {
-    /// γ = 1
-    Ideal,
-    /// `log₁₀ γ = −A z² √I`
-    DebyeHuckel,
-    /// `log₁₀ γ = −A z² √I / (1 + B å √I)`
-    ExtendedDebyeHuckel,
-    /// `log₁₀ γ = −A z² (√I / (1 + √I) − 0.3 I)`
-    Davies,
 }
 
 impl super::Plan {

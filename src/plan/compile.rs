@@ -52,7 +52,7 @@ pub struct Compiled {
 
 /// Compiles a scenario. The plan is absent if a limit refuses it.
 pub fn compile(scenario: &Scenario, options: &Options) -> (Option<Compiled>, Vec<Diagnostic>) {
-    let (plan, evaluation) = match lower::lower(scenario) {
+    let (plan, evaluation, warnings) = match lower::lower(scenario) {
         Ok(lowered) => lowered,
         Err(problems) => return (None, problems),
     };
@@ -62,7 +62,8 @@ pub fn compile(scenario: &Scenario, options: &Options) -> (Option<Compiled>, Vec
     }
     passes::run(&mut draft, |pass| options.passes.takes(pass));
     let cost = cost::estimate(&draft.plan);
-    let (limits, diagnostics) = limits::check(scenario, &draft, &cost, options.memory);
+    let (limits, found) = limits::check(scenario, &draft, &cost, options.memory);
+    let diagnostics = [warnings, found].concat();
     if crate::diagnostic::any_fatal(&diagnostics) {
         return (None, diagnostics);
     }

@@ -2,19 +2,21 @@
 
 use super::build_tape::build_tape;
 use super::evaluation::{self, Evaluation};
+use super::lower_chemistry::{self, Network};
 use super::{
-    Axis, Component, InstantReaction, Mixing, NUMERICS_VERSION, Normals, Output, OutputUnit, Particles, Plan,
-    Quantity, Species, Stage, Time, Walk, Zone, ZoneRate,
+    Axis, InstantReaction, Mixing, NUMERICS_VERSION, Normals, Output, OutputUnit, Particles, Plan, Quantity,
+    Stage, Time, Walk, Zone, ZoneRate, method,
 };
 use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{D008, M005};
 use crate::scenario::{self, Scenario};
-use crate::units::Dimension;
 
-/// Lowers a scenario; the diagnostics tell of expressions that are too large for a tape.
-pub fn lower(scenario: &Scenario) -> Result<(Plan, Evaluation), Vec<Diagnostic>> {
+/// A plan with what computes references and measures from its results, and warnings.
+pub type Lowered = (Plan, Evaluation, Vec<Diagnostic>);
+
+/// Lowers a scenario; what is refused is too large for a tape, or chemistry without a solution.
+pub fn lower(scenario: &Scenario) -> Result<Lowered, Vec<Diagnostic>> {
     let mut problems = Vec::new();
-    let components = components(scenario, &mut problems);
     let evaluation = evaluation(scenario, &mut problems);
     if !problems.is_empty() {
         return Err(problems);
@@ -23,8 +25,9 @@ pub fn lower(scenario: &Scenario) -> Result<(Plan, Evaluation), Vec<Diagnostic>>
     let bins = scenario.bins.as_ref().map_or_else(|| vec![1; n_axes], |bins| bins.value.clone());
     let axes: Vec<Axis> =
         scenario.domain.axes.iter().zip(bins).map(|(axis, bins)| lower_axis(axis, bins)).collect();
+    let Network { species, components, chemistry, warnings } = lower_chemistry::network(scenario, &axes)?;
     let volume: f64 = axes.iter().map(|axis| axis.high - axis.low).product();
-    let plan = Plan {
+    let mut plan = Plan {
         numerics: NUMERICS_VERSION,
         walk: walk(scenario),
         particles: Particles {
@@ -32,16 +35,11 @@ pub fn lower(scenario: &Scenario) -> Result<(Plan, Evaluation), Vec<Diagnostic>>
             placement: scenario.particles.placement,
             volume: volume / scenario.particles.count as f64,
         },
-        species: scenario
-            .species
-            .iter()
-            .enumerate()
-            .map(|(idx, species)| lower_species(idx, species))
-            .collect(),
+        species,
         components,
         mixing: scenario.mixing.as_ref().map(lower_mixing),
-        reactions: scenario.reactions.iter().map(lower_reaction).collect(),
-        chemistry: None,
+        reactions: scenario.reactions.iter().filter_map(lower_reaction).collect(),
+        chemistry,
         time: time(scenario),
         outputs: scenario.outputs.iter().map(lower_output).collect(),
         stages: vec![Stage::Mix, Stage::Move, Stage::Bound, Stage::Average, Stage::Observe],
@@ -51,7 +49,11 @@ pub fn lower(scenario: &Scenario) -> Result<(Plan, Evaluation), Vec<Diagnostic>>
     if !plan.walk.drift.iter().chain(&plan.walk.spread).copied().all(f64::is_finite) {
         return Err(vec![unbounded_walk(scenario, &plan)]);
     }
-    Ok((plan, evaluation))
+    method::choose(&mut plan);
+    if plan.reacts_in_steps() {
+        plan.stages.insert(1, Stage::React);
+    }
+    Ok((plan, evaluation, warnings))
 }
 
 /// Numbers that can be written may have a difference or a product that is none.
@@ -120,27 +122,7 @@ pub(super) fn cholesky(a: &[Vec<f64>]) -> Vec<f64> {
     (0..n).flat_map(|i| l[i][..=i].to_vec()).collect()
 }
 
-fn lower_species(idx: usize, species: &scenario::Species) -> Species {
-    Species {
-        name: species.name.clone(),
-        constant: 0.0,
-        terms: vec![(idx, 1.0)],
-        is_molar: species.dimension == Dimension::MOLAR_CONCENTRATION,
-    }
-}
-
-fn components(scenario: &Scenario, problems: &mut Vec<Diagnostic>) -> Vec<Component> {
-    let mut list = Vec::new();
-    for species in &scenario.species {
-        match build_tape(&species.initial, &scenario.species) {
-            Some(initial) => list.push(Component { name: species.name.clone(), initial, is_immobile: false }),
-            None => problems.push(too_large(species.initial.span)),
-        }
-    }
-    list
-}
-
-fn too_large(span: crate::source::Span) -> Diagnostic {
+pub(super) fn too_large(span: crate::source::Span) -> Diagnostic {
     Diagnostic::error(D008, "this expression is too large")
         .at(span, "more than 65,000 operations")
         .found("more than 65,000 operations")
@@ -160,12 +142,12 @@ fn lower_mixing(mixing: &scenario::Mixing) -> Mixing {
     }
 }
 
-fn lower_reaction(reaction: &scenario::Reaction) -> InstantReaction {
-    InstantReaction {
+fn lower_reaction(reaction: &scenario::Reaction) -> Option<InstantReaction> {
+    (reaction.rate == scenario::Rate::Instant).then(|| InstantReaction {
         name: reaction.name.clone(),
         reactants: reaction.reactants.clone(),
         products: reaction.products.clone(),
-    }
+    })
 }
 
 fn time(scenario: &Scenario) -> Time {

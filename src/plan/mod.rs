@@ -5,6 +5,7 @@
 
 pub mod build_tape;
 mod check;
+mod check_chemistry;
 pub mod chemistry;
 pub mod compile;
 pub mod cost;
@@ -13,8 +14,11 @@ mod edges;
 pub mod eliminate;
 pub mod evaluation;
 pub mod explain;
+mod law;
 pub mod limits;
 mod lower;
+mod lower_chemistry;
+mod method;
 pub mod passes;
 pub mod tape;
 pub mod time_scales;

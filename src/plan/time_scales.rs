@@ -182,7 +182,7 @@ fn implicit(j: &[f64], f: &[f64], h: f64) -> Option<Vec<f64>> {
 }
 
 /// Centres of a coarse grid over the domain; axes that were left out are at 0.
-fn sample_points(axes: &[Axis]) -> Vec<[f64; 3]> {
+pub(super) fn sample_points(axes: &[Axis]) -> Vec<[f64; 3]> {
     let mut points = vec![[0.0; 3]];
     let per_axis = if axes.len() > 2 { POINTS / 2 } else { POINTS };
     for axis in axes {

@@ -3,8 +3,9 @@
 use super::check::{Allow, Call, Checker};
 use super::expression::{Expr, Type};
 use super::scope::{BUILT_IN_FUNCTIONS, Locals, Origin};
+use crate::catalog::rate;
 use crate::diagnostic::Diagnostic;
-use crate::diagnostic::codes::{D005, D006, D007, D009, U102};
+use crate::diagnostic::codes::{D005, D006, D007, D009, U102, U104};
 use crate::maths::operator::{Binary, Unary};
 use crate::source::Span;
 use crate::syntax::tree;
@@ -41,7 +42,8 @@ impl<'a> Checker<'a> {
             }
             None => None,
         };
-        if statement.is_none() && !BUILT_IN_FUNCTIONS.contains(&name) {
+        let item = rate::find(name);
+        if statement.is_none() && item.is_none() && !BUILT_IN_FUNCTIONS.contains(&name) {
             self.scope.note_undefined(name, function.span);
             return None;
         }
@@ -55,10 +57,58 @@ impl<'a> Checker<'a> {
             return None;
         }
         let values: Vec<Expr> = checked.into_iter().collect::<Option<_>>()?;
-        match statement {
-            Some(statement) => self.user_function(statement, values, function.span, span, allow),
-            None => self.built_in(name, values, function.span, span),
+        match (statement, item) {
+            // A function of the scene comes before one of the catalogue.
+            (Some(statement), _) => self.user_function(statement, values, function.span, span, allow),
+            (None, Some(item)) => self.of_catalogue(item, values, function.span, span),
+            (None, None) => self.built_in(name, values, function.span, span),
         }
+    }
+
+    fn of_catalogue(
+        &mut self,
+        item: &'static rate::Item,
+        values: Vec<Expr>,
+        name_span: Span,
+        span: Span,
+    ) -> Option<Expr> {
+        if !self.has_arguments(item.name, name_span, item.arguments.len(), values.len()) {
+            return None;
+        }
+        if let Some(wrong) = values.iter().find(|value| value.kind == Type::Truth) {
+            return self.wrong_kind(&format!("`{}`", item.name), "a number", wrong.kind, wrong.span);
+        }
+        let given = |value: &Expr| match value.kind {
+            Type::Number(dimension) => Some(dimension),
+            Type::Zero | Type::Truth => None,
+        };
+        let dimensions: Vec<_> = values.iter().map(given).collect();
+        let dimension = match (item.dimension)(&dimensions) {
+            Ok(dimension) => dimension,
+            Err(mismatch) => {
+                let wrong = &values[mismatch.argument];
+                let (argument, meaning) = item.arguments[mismatch.argument];
+                self.report(
+                    Diagnostic::error(
+                        U104,
+                        format!("`{argument}` of `{}` has the wrong dimension", item.name),
+                    )
+                    .at(wrong.span, format!("this is {}", wrong.kind.describe()))
+                    .found(wrong.kind.describe())
+                    .expected(mismatch.expected.describe())
+                    .note(format!("`{argument}` is the {meaning}")),
+                );
+                return None;
+            }
+        };
+        let kind = Type::Number(dimension);
+        let built = item.follow(
+            &values,
+            |value| Expr::constant(value, kind, span),
+            |operator, a| Expr::unary(operator, a, kind, span),
+            |operator, a, b| Expr::binary(operator, a, b, kind, span),
+        )?;
+        Some(Expr { span, kind, ..built })
     }
 
     fn user_function(

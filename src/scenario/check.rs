@@ -23,6 +23,7 @@ pub(super) struct Allow {
 impl Allow {
     pub(super) const CONSTANT: Self = Self { position: false, time: false, species: false };
     pub(super) const INITIAL: Self = Self { position: true, time: false, species: true };
+    pub(super) const RATE: Self = Self { position: true, time: true, species: true };
     pub(super) const REFERENCE: Self = Self { position: true, time: true, species: false };
 }
 
@@ -197,7 +198,7 @@ impl<'a> Checker<'a> {
             if is_doubtful {
                 return None;
             }
-            if BUILT_IN_FUNCTIONS.contains(&text) {
+            if BUILT_IN_FUNCTIONS.contains(&text) || crate::catalog::rate::find(text).is_some() {
                 self.report(
                     Diagnostic::error(D005, format!("`{text}` cannot be used here"))
                         .at(span, "a built-in function without its arguments")

@@ -43,6 +43,55 @@ pub enum Placement {
 pub(super) const PLACEMENTS: &[(&str, Placement)] =
     &[("stratified", Placement::Stratified), ("random", Placement::Random), ("ordered", Placement::Ordered)];
 
+/// The order in which transport and reaction take turns.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Splitting {
+    /// Transport, then reaction over the whole step: first order.
+    Lie,
+    /// Half a reaction, transport, half a reaction: second order.
+    Strang,
+}
+
+pub(super) const SPLITTINGS: &[(&str, Splitting)] = &[("lie", Splitting::Lie), ("strang", Splitting::Strang)];
+
+/// Activity coefficients from the ionic strength `I = ½ Σ z² c`, in mol/L.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Activity {
+    /// γ = 1
+    Ideal,
+    /// `log₁₀ γ = −A z² √I`
+    DebyeHuckel,
+    /// `log₁₀ γ = −A z² √I / (1 + B å √I)`
+    ExtendedDebyeHuckel,
+    /// `log₁₀ γ = −A z² (√I / (1 + √I) − 0.3 I)`
+    Davies,
+}
+
+pub(super) const ACTIVITIES: &[(&str, Activity)] = &[
+    ("ideal", Activity::Ideal),
+    ("debye_huckel", Activity::DebyeHuckel),
+    ("extended_debye_huckel", Activity::ExtendedDebyeHuckel),
+    ("davies", Activity::Davies),
+];
+
+/// What the scene asks of the integration of rates.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Integrator {
+    /// The plan chooses: a closed form where there is one, else by stiffness.
+    #[default]
+    Auto,
+    /// Dormand–Prince 5(4), also where a closed form exists.
+    Explicit,
+    /// Rodas, also where a closed form exists.
+    Rosenbrock,
+}
+
+pub(super) const INTEGRATORS: &[(&str, Integrator)] =
+    &[("auto", Integrator::Auto), ("explicit", Integrator::Explicit), ("rosenbrock", Integrator::Rosenbrock)];
+
 /// What is observed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -21,6 +21,7 @@ pub(super) struct Statements<'a> {
     pub functions: Vec<&'a tree::Function>,
     pub species: Vec<&'a tree::Species>,
     pub reactions: Vec<(Span, &'a tree::Reaction)>,
+    pub chemistry: Option<(Span, &'a [tree::Field])>,
     pub domain: Option<(Span, &'a tree::Domain)>,
     pub boundaries: Vec<&'a tree::Boundary>,
     pub flow: Option<(Span, &'a tree::Flow)>,
@@ -139,6 +140,7 @@ fn gather<'a>(file: &'a tree::File, diagnostics: &mut Vec<Diagnostic>) -> Statem
             StatementKind::Function(s) => all.functions.push(s),
             StatementKind::Species(list) => all.species.extend(list),
             StatementKind::Reaction(s) => all.reactions.push((span, s)),
+            StatementKind::Chemistry(s) => all.chemistry = Some((span, s)),
             StatementKind::Domain(s) => all.domain = Some((span, s)),
             StatementKind::Boundary(s) => all.boundaries.push(s),
             StatementKind::Flow(s) => all.flow = Some((span, s)),
@@ -165,6 +167,7 @@ fn single(kind: &StatementKind) -> Option<&'static str> {
     Some(match kind {
         StatementKind::Title(_) => "title",
         StatementKind::Seed(_) => "seed",
+        StatementKind::Chemistry(_) => "chemistry",
         StatementKind::Domain(_) => "domain",
         StatementKind::Flow(_) => "flow",
         StatementKind::Dispersion(_) => "dispersion",
@@ -235,7 +238,8 @@ fn build<'a>(
     let parameters = parameters(checker, statements);
     let domain = super::geometry::domain(checker, statements);
     let species = super::model::species(checker, statements);
-    let reactions = super::reactions::reactions(checker, statements, &species);
+    let reactions = super::reactions::reactions(checker, statements);
+    let chemistry = super::chemistry::chemistry(checker, statements);
     let flow = super::geometry::flow(checker, statements);
     let dispersion = super::geometry::dispersion(checker, statements);
     let mixing = super::zones::mixing(checker, statements);
@@ -261,7 +265,7 @@ fn build<'a>(
     if !(are_outputs_right && are_references_right && is_analysis_right) {
         return None;
     }
-    Some(Scenario {
+    let scenario = Scenario {
         title: statements.title.map(|title| title.value.clone()),
         citations: statements.citations.iter().map(|text| text.value.clone()).collect(),
         settings: settings
@@ -272,6 +276,7 @@ fn build<'a>(
         parameters,
         species: species.all_right()?,
         reactions: reactions?,
+        chemistry: chemistry?,
         domain: domain?,
         flow: flow?,
         dispersion: dispersion?,
@@ -285,7 +290,9 @@ fn build<'a>(
         measures,
         sweeps,
         reports,
-    })
+    };
+    super::reactions::check_places(checker, &scenario);
+    Some(scenario)
 }
 
 fn report_missing<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>, file: &'a tree::File) {

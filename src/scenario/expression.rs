@@ -61,7 +61,7 @@ pub enum Node {
     /// Coordinate 0, 1, 2 for x, y, z.
     Axis(usize),
     Time,
-    /// The initial concentration of a species.
+    /// The concentration of a species: the initial one in initial concentrations, the current one in rates.
     Species(usize),
     Unary(Unary, Box<Expr>),
     Binary(Binary, Box<Expr>, Box<Expr>),
@@ -109,6 +109,13 @@ impl Expr {
         let size = condition.size.saturating_add(then.size).saturating_add(otherwise.size).saturating_add(1);
         let node = Node::Select(Box::new(condition), Box::new(then), Box::new(otherwise));
         Self { span, kind, node, size }
+    }
+
+    /// Whether a species is named in it.
+    pub fn names_species(&self) -> bool {
+        let mut found = false;
+        self.walk(&mut |expr| found |= matches!(expr.node, Node::Species(_)));
+        found
     }
 
     /// Calls `visit` on this expression and everything below it.

@@ -5,9 +5,11 @@
 
 mod call;
 mod check;
+mod chemistry;
 mod choice;
 mod collect;
 pub mod condition;
+mod equilibrium;
 pub mod expression;
 mod geometry;
 mod measure;
@@ -15,7 +17,9 @@ mod model;
 mod observe;
 mod places;
 mod point;
+mod qualifiers;
 mod quantity;
+mod rates;
 mod reactions;
 mod reference;
 mod restriction;
@@ -30,7 +34,7 @@ use crate::source::{Span, Spanned};
 use crate::units::Dimension;
 use expression::Expr;
 
-pub use choice::{OutputKind, Placement, Side};
+pub use choice::{Activity, Integrator, OutputKind, Placement, Side, Splitting};
 pub use collect::resolve;
 pub use geometry::MAX_BINS;
 pub use measure::{Fact, Field, FieldTarget, Norm, Scalar};
@@ -61,6 +65,7 @@ pub struct Scenario {
     pub parameters: Vec<Parameter>,
     pub species: Vec<Species>,
     pub reactions: Vec<Reaction>,
+    pub chemistry: Chemistry,
     pub domain: Domain,
     /// Velocity in the resting frame, m/s; absent without a `flow` statement.
     pub flow: Option<Spanned<[f64; 3]>>,
@@ -77,6 +82,16 @@ pub struct Scenario {
     pub measures: Vec<Measure>,
     pub sweeps: Vec<sweep::Sweep>,
     pub reports: Vec<sweep::Report>,
+}
+
+impl Scenario {
+    /// Whether fluid, frame or exchange between zones could carry anything away from where it is.
+    pub fn has_transport(&self) -> bool {
+        let flows = self.flow.as_ref().is_some_and(|flow| flow.value.iter().any(|v| *v != 0.0));
+        let mut entries = self.dispersion.iter().flat_map(|tensor| tensor.value.iter().flatten());
+        let is_moving = self.domain.frame.iter().any(|v| *v != 0.0);
+        flows || is_moving || self.mixing.is_some() || entries.any(|entry| *entry != 0.0)
+    }
 }
 
 /// A parameter as it was set, for the record of the run.
@@ -103,9 +118,16 @@ pub struct Species {
     pub dimension: Dimension,
     /// Initial concentration over x, y, z; may refer to other species' initial concentrations.
     pub initial: Expr,
+    /// Whether it stays where it is; true of minerals, too.
+    pub is_immobile: bool,
+    /// A pure phase: its activity is 1.
+    pub is_mineral: bool,
+    pub charge: Option<f64>,
+    /// Ion-size parameter å, m.
+    pub ion_size: Option<f64>,
 }
 
-/// A complete, irreversible reaction (`@ instant`).
+/// One direction of a reaction: `A <-> B @ forward …, backward …` makes two of these.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reaction {
     pub name: String,
@@ -113,6 +135,34 @@ pub struct Reaction {
     /// `(species, ν > 0)`
     pub reactants: Vec<(usize, f64)>,
     pub products: Vec<(usize, f64)>,
+    pub rate: Rate,
+    pub rate_span: Span,
+}
+
+/// How fast a reaction goes.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Rate {
+    /// Complete and irreversible, before anything else happens.
+    Instant,
+    /// `k Π c^order`, the orders being the coefficients of the reactants; k without species.
+    MassAction(Expr),
+    /// The rate itself, concentration/s; species stand for current concentrations.
+    Law(Expr),
+    /// `K = Π products^ν / Π reactants^ν` in (mol/m³)^Δν, minerals not counted.
+    Equilibrium(f64),
+}
+
+/// How reactions are worked out: the `chemistry` statement, or its defaults.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Chemistry {
+    /// Absent without the statement.
+    pub span: Option<Span>,
+    pub tolerance: f64,
+    /// In SI, for the species of this dimension.
+    pub floor: Option<(f64, Dimension)>,
+    pub splitting: Splitting,
+    pub activity: Activity,
+    pub integrator: Integrator,
 }
 
 #[derive(Debug, Clone, PartialEq)]

@@ -7,7 +7,7 @@ use super::expression::{Expr, Type};
 use super::scope::Origin;
 use super::slot::collect_names;
 use super::{Particles, Placement, Run, Species};
-use crate::diagnostic::codes::{D002, D005, D006, M001, M004, M005, M009};
+use crate::diagnostic::codes::{D002, D005, D006, M001, M005, M009};
 use crate::diagnostic::{Diagnostic, precise};
 use crate::source::Span;
 use crate::syntax::tree;
@@ -30,21 +30,8 @@ impl SpeciesList {
 const CONCENTRATIONS: [Dimension; 2] = [Dimension::MOLAR_CONCENTRATION, Dimension::MASS_CONCENTRATION];
 
 pub(super) fn species<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> SpeciesList {
-    for species in &statements.species {
-        for qualifier in &species.qualifiers {
-            // All species move with the fluid in this version; the word may say so.
-            if qualifier.value == "immobile" {
-                checker.report(
-                    Diagnostic::error(M004, "immobile species are not in this version")
-                        .at(qualifier.span, "all species move with the fluid")
-                        .found("`immobile`")
-                        .expected("`mobile`, or nothing"),
-                );
-            } else {
-                checker.word(qualifier, "a property of a species", &[("mobile", ())]);
-            }
-        }
-    }
+    let properties: Vec<_> =
+        statements.species.iter().map(|species| super::qualifiers::properties(checker, species)).collect();
     let assigned = assignments(checker, statements);
     let mut initials: Vec<Initial> = vec![Initial::Untouched; statements.species.len()];
     let mut running = Vec::new();
@@ -65,6 +52,10 @@ pub(super) fn species<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>
             span: written.name.span,
             dimension,
             initial,
+            is_immobile: properties[idx].is_immobile,
+            is_mineral: properties[idx].is_mineral,
+            charge: properties[idx].charge,
+            ion_size: properties[idx].ion_size,
         })
     });
     SpeciesList { list: list.collect() }

@@ -1,6 +1,7 @@
 //! Names of a scene: each has one origin, whatever the order of statements.
 
 use super::expression::{Expr, Type};
+use crate::catalog::rate;
 use crate::diagnostic::codes::{D002, D003, D004};
 use crate::diagnostic::{Diagnostic, did_you_mean};
 use crate::source::Span;
@@ -204,8 +205,8 @@ impl<'a> Scope<'a> {
             .found(format!("`{name}`"))
             .expected("a name that the scene defines");
         let names = self.entries.keys().map(String::as_str);
-        let candidates =
-            names.chain(BUILT_IN_FUNCTIONS.iter().copied()).chain(axes.iter().map(String::as_str));
+        let functions = BUILT_IN_FUNCTIONS.iter().copied().chain(rate::ALL.iter().map(|item| item.name));
+        let candidates = names.chain(functions).chain(axes.iter().map(String::as_str));
         if let Some(candidate) = did_you_mean(name, candidates) {
             message = message.help(format!("did you mean `{candidate}`?"));
             if let Some(entry) = self.entries.get(candidate) {

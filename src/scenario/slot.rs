@@ -62,7 +62,7 @@ impl<'a> Checker<'a> {
     }
 
     /// The constants and parameters that an expression names, with the places that set them.
-    fn constants_in(&self, expr: &tree::Expr) -> Vec<(String, Span, Type)> {
+    pub(super) fn constants_in(&self, expr: &tree::Expr) -> Vec<(String, Span, Type)> {
         let mut names = Vec::new();
         collect_names(expr, &mut names);
         names.sort_unstable();

@@ -21,6 +21,7 @@ pub fn rule_of(keyword: &str) -> Option<Rule> {
         "fn" => Rule::function,
         "species" => Rule::species,
         "reaction" => Rule::reaction,
+        "chemistry" => Rule::chemistry,
         "domain" => Rule::domain,
         "boundary" => Rule::boundary,
         "flow" => Rule::flow,

@@ -77,6 +77,8 @@ pub enum StatementKind {
     Species(Vec<Species>),
     /// `reaction name: A + 2 B -> C @ instant`
     Reaction(Reaction),
+    /// `chemistry tolerance 1e-6, activity davies`: settings in the order written.
+    Chemistry(Vec<Field>),
     /// `domain line x = 0 m .. 1 m, frame moving v`
     Domain(Domain),
     /// `boundary left, right reflect`
@@ -217,9 +219,17 @@ pub struct Function {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Species {
     pub name: Name,
-    /// Words after the name (`immobile`, `mobile`, …), resolved in `scenario`.
-    pub qualifiers: Vec<Name>,
+    /// What stands after the name (`immobile`, `charge 2`, …), resolved in `scenario`.
+    pub qualifiers: Vec<Qualifier>,
     pub doc: Option<Text>,
+}
+
+/// A property of a species.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Qualifier {
+    pub name: Name,
+    /// What stands after `charge` or `ion_size`.
+    pub value: Option<Expr>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -228,15 +238,23 @@ pub struct Reaction {
     pub reactants: Vec<Term>,
     pub arrow: Spanned<Arrow>,
     pub products: Vec<Term>,
-    /// What stands after `@`; `instant` is a plain name here.
-    pub rate: Expr,
+    pub rate: Rate,
 }
 
-/// `2 B` in an equation.
+/// What stands after `@`.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Rate {
+    /// One law; `instant` is a plain name here, `equilibrium(…)` a call.
+    One(Expr),
+    /// `forward kf, backward kb`, in the order written.
+    Directions(Vec<Field>),
+}
+
+/// `2 B` or `Y B` in an equation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Term {
-    /// The coefficient as written; absent means one.
-    pub coefficient: Option<Spanned<String>>,
+    /// A number without a unit or a name; absent means one.
+    pub coefficient: Option<Expr>,
     pub species: Name,
 }
 

@@ -14,6 +14,7 @@ pub const STATEMENT_KEYWORDS: &[&str] = &[
     "fn",
     "species",
     "reaction",
+    "chemistry",
     "domain",
     "boundary",
     "flow",
@@ -32,7 +33,7 @@ pub const STATEMENT_KEYWORDS: &[&str] = &[
 ];
 
 /// First words that the language description knows and this version does not run yet.
-pub const LATER_KEYWORDS: &[&str] = &["medium", "source", "kernel", "data", "chemistry"];
+pub const LATER_KEYWORDS: &[&str] = &["medium", "source", "kernel", "data"];
 
 /// Statements whose body in braces may hold what looks like statements.
 pub const BODY_KEYWORDS: &[&str] = &["sweep"];
@@ -55,7 +56,9 @@ pub fn is_statement_keyword(word: &str) -> bool {
 pub fn clause_words(keyword: &str) -> &'static [&'static str] {
     match keyword {
         "param" => &["in"],
-        "species" => &["immobile", "mobile"],
+        "species" => &["immobile", "mobile", "mineral", "charge", "ion_size"],
+        "reaction" => &["forward", "backward"],
+        "chemistry" => &["tolerance", "floor", "order", "splitting", "activity", "integrator"],
         "domain" => &["frame", "moving"],
         "mixing" => &["zones", "fraction", "rate"],
         "run" => &["to", "step"],

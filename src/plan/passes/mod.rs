@@ -4,6 +4,7 @@
 //! never changes what the outputs mean: the driver checks that after each pass.
 
 mod axes;
+mod network;
 mod outputs;
 mod relations;
 mod species;
@@ -49,6 +50,8 @@ pub const PASSES: &[Pass] = &[
     Pass { name: "outputs", run: outputs::run, keeps_bytes: true },
     // Before relations: a species that nobody reads must not become the one that others derive from.
     Pass { name: "species", run: species::run, keeps_bytes: true },
+    // Before relations, too. Fewer reactions are integrated together with other steps: other last digits.
+    Pass { name: "reactions", run: network::run, keeps_bytes: false },
     // Before stages, which asks whether any zone still exchanges.
     Pass { name: "zones", run: zones::run, keeps_bytes: true },
     // Merging sums fractions before multiplying: the last bit may differ.

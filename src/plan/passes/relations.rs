@@ -4,10 +4,16 @@
 //! so a relation between initial concentrations, `U_b = α + Σ β_k U_k`, holds for ever. Relations are
 //! found by writing every initial concentration as a constant plus a combination of basis
 //! functions (indicators of conditions, coordinates, anything not linear) and eliminating.
+//!
+//! Reactions at finite rates change components in fixed proportions: the extent of each reaction is one
+//! more basis function. What moves and what stays in its bin have no relation but that of constants.
 
 use super::Draft;
+use super::species::retain_by;
 use crate::diagnostic::number;
 use crate::maths::operator::{Binary, Unary};
+use crate::plan::Plan;
+use crate::plan::chemistry::Method;
 use crate::plan::tape::{Operation, Register, Tape};
 use std::collections::BTreeMap;
 
@@ -22,8 +28,7 @@ struct Affine {
 const TOLERANCE: f64 = 1e-12;
 
 pub(super) fn run(draft: &mut Draft) {
-    let forms: Vec<Affine> =
-        draft.plan.components.iter().map(|component| affine_of(&component.initial)).collect();
+    let forms: Vec<Affine> = (0..draft.plan.components.len()).map(|idx| form_of(&draft.plan, idx)).collect();
     let mut kept: Vec<usize> = Vec::new();
     let mut relations: Vec<Option<Relation>> = Vec::new();
     for (idx, form) in forms.iter().enumerate() {
@@ -39,6 +44,31 @@ pub(super) fn run(draft: &mut Draft) {
     note(draft, &relations);
     restore(draft, &relations, &kept);
 }
+
+/// A component over initial shapes and the extents of the reactions that change it.
+fn form_of(plan: &Plan, idx: usize) -> Affine {
+    let component = &plan.components[idx];
+    let mut form = affine_of(&component.initial);
+    let kinetics = plan.chemistry.as_ref().and_then(|chemistry| chemistry.kinetics.as_ref());
+    // Of a network that is propagated when somebody looks, particles carry what has not reacted.
+    for (number, reaction) in kinetics
+        .filter(|kinetics| kinetics.method != Method::Observed)
+        .iter()
+        .flat_map(|kinetics| kinetics.reactions.iter().enumerate())
+    {
+        let change = reaction.changes.iter().find(|(component, _)| *component == idx);
+        if let Some((_, change)) = change {
+            form.terms.insert(format!("{EXTENT}{number}"), *change);
+        }
+    }
+    if component.is_immobile {
+        form.terms = form.terms.into_iter().map(|(name, value)| (format!("resting {name}"), value)).collect();
+    }
+    form
+}
+
+/// Names of extents begin with this; no text of a tape does.
+const EXTENT: &str = "extent ";
 
 /// `α + Σ β_k U_k` over kept components.
 struct Relation {
@@ -78,26 +108,43 @@ fn note(draft: &mut Draft, relations: &[Option<Relation>]) {
 fn restore(draft: &mut Draft, relations: &[Option<Relation>], kept: &[usize]) {
     let place = |component: usize| kept.iter().position(|known| *known == component);
     for species in &mut draft.plan.species {
-        let mut terms: BTreeMap<usize, f64> = BTreeMap::new();
-        for (component, factor) in std::mem::take(&mut species.terms) {
-            match &relations[component] {
-                None => *terms.entry(component).or_default() += factor,
-                Some(relation) => {
-                    species.constant += factor * relation.constant;
-                    for (other, share) in &relation.terms {
-                        *terms.entry(*other).or_default() += factor * share;
-                    }
+        rewrite(&mut species.constant, &mut species.terms, relations, &place);
+    }
+    let is_kept: Vec<bool> = relations.iter().map(Option::is_none).collect();
+    retain_by(&mut draft.plan.components, &is_kept);
+    let Some(chemistry) = &mut draft.plan.chemistry else { return };
+    retain_by(&mut chemistry.floors, &is_kept);
+    let kinetics = chemistry.kinetics.iter_mut().filter(|kinetics| kinetics.method != Method::Observed);
+    for reaction in kinetics.flat_map(|kinetics| &mut kinetics.reactions) {
+        let changes = std::mem::take(&mut reaction.changes);
+        reaction.changes =
+            changes.into_iter().filter_map(|(component, change)| Some((place(component)?, change))).collect();
+    }
+    for primary in chemistry.equilibrium.iter_mut().flat_map(|equilibrium| &mut equilibrium.primaries) {
+        rewrite(&mut primary.constant, &mut primary.terms, relations, &place);
+    }
+}
+
+/// An affine combination of all components over the kept ones.
+fn rewrite(
+    constant: &mut f64,
+    terms: &mut Vec<(usize, f64)>,
+    relations: &[Option<Relation>],
+    place: &impl Fn(usize) -> Option<usize>,
+) {
+    let mut kept: BTreeMap<usize, f64> = BTreeMap::new();
+    for (component, factor) in std::mem::take(terms) {
+        match &relations[component] {
+            None => *kept.entry(component).or_default() += factor,
+            Some(relation) => {
+                *constant += factor * relation.constant;
+                for (other, share) in &relation.terms {
+                    *kept.entry(*other).or_default() += factor * share;
                 }
             }
         }
-        species.terms =
-            terms.into_iter().filter_map(|(component, factor)| Some((place(component)?, factor))).collect();
     }
-    let mut idx = 0;
-    draft.plan.components.retain(|_| {
-        idx += 1;
-        relations[idx - 1].is_none()
-    });
+    *terms = kept.into_iter().filter_map(|(component, factor)| Some((place(component)?, factor))).collect();
 }
 
 /// The relation of `form` to the kept components, if there is one.
@@ -119,11 +166,18 @@ fn express(form: &Affine, kept: &[usize], forms: &[Affine]) -> Option<Relation> 
         nalgebra::DMatrix::from_fn(names.len(), kept.len(), |row, column| entry(&forms[kept[column]], row));
     let target = nalgebra::DVector::from_fn(names.len(), |row, _| entry(form, row));
     let scale = target.amax();
+    let target_of = |row: usize| target[row].abs();
     let solved = matrix.clone().svd(true, true).solve(&target, 1e-13 * matrix.amax()).ok()?;
     let factors: Vec<f64> = solved.iter().map(|factor| snap(*factor)).collect();
-    let residual = (&matrix * nalgebra::DVector::from_vec(factors.clone()) - &target).amax();
+    let residual = &matrix * nalgebra::DVector::from_vec(factors.clone()) - &target;
     // Not a number is no relation, too.
-    if residual.is_nan() || residual > TOLERANCE * scale {
+    if residual.amax().is_nan() || residual.amax() > TOLERANCE * scale {
+        return None;
+    }
+    // Coefficients of reactions are small beside concentrations, and hold by themselves.
+    let is_extent = |row: usize| names[row].contains(EXTENT);
+    if (0..names.len()).any(|row| is_extent(row) && residual[row].abs() > TOLERANCE * target_of(row).max(1.0))
+    {
         return None;
     }
     let constant = kept

@@ -1,6 +1,6 @@
 //! Liveness of species, backwards from the outputs: what nobody reads is neither carried nor reacted.
 
-use super::Draft;
+use super::{Draft, network};
 use crate::plan::evaluation::{Field, Scalar};
 use crate::plan::{Plan, Quantity};
 
@@ -23,11 +23,20 @@ pub(super) fn run(draft: &mut Draft) {
         let list = dead.iter().map(|name| format!("`{name}`")).collect::<Vec<_>>().join(", ");
         draft.leave_out(format!("{} {list}", word.trim()), "no output reads it, alone or through a reaction");
     }
+    let is_chemistry_read = network::species_of_chemistry(&draft.plan)
+        .iter()
+        .zip(&is_read)
+        .any(|(own, is_read)| *own && *is_read);
+    if !is_chemistry_read && draft.plan.chemistry.take().is_some() {
+        draft.leave_out("reactions at rates and in equilibrium", "no output reads any of their species");
+    }
     remove(draft, &is_read);
 }
 
-/// Species that outputs name, and the reactants of every reaction that touches one of these.
+/// Species that outputs name, the reactants of every instant reaction that touches one of these, and
+/// everything that the kinetics or equilibria which touch one of these are about.
 fn read_species(plan: &Plan) -> Vec<bool> {
+    let chemical = network::species_of_chemistry(plan);
     let mut is_read = vec![false; plan.species.len()];
     for quantity in plan.outputs.iter().flat_map(|output| &output.quantities) {
         match *quantity {
@@ -47,6 +56,9 @@ fn read_species(plan: &Plan) -> Vec<bool> {
                 reaction.reactants.iter().for_each(|(species, _)| is_read[*species] = true);
             }
         }
+        if (0..is_read.len()).any(|species| is_read[species] && chemical[species]) {
+            is_read.iter_mut().zip(&chemical).for_each(|(is_read, chemical)| *is_read |= chemical);
+        }
         if before == is_read {
             return is_read;
         }
@@ -54,7 +66,7 @@ fn read_species(plan: &Plan) -> Vec<bool> {
 }
 
 /// Drops the species that are not read, with their components, and renumbers the rest.
-fn remove(draft: &mut Draft, is_read: &[bool]) {
+pub(super) fn remove(draft: &mut Draft, is_read: &[bool]) {
     let mut next = 0;
     let renumbered: Vec<Option<usize>> = is_read
         .iter()
@@ -73,6 +85,9 @@ fn remove(draft: &mut Draft, is_read: &[bool]) {
         .collect();
     retain_by(&mut plan.components, &is_carried);
     let new_component = |old: usize| is_carried[..old].iter().filter(|is_carried| **is_carried).count();
+    if let Some(chemistry) = &mut plan.chemistry {
+        network::renumber(chemistry, &is_carried, &renumbered);
+    }
     for species in &mut plan.species {
         species.terms.iter_mut().for_each(|(component, _)| *component = new_component(*component));
     }
@@ -135,7 +150,8 @@ fn renumber_field(field: &mut Field, is_kept: &[bool], quantity: &impl Fn(&mut Q
     }
 }
 
-fn retain_by<T>(list: &mut Vec<T>, is_kept: &[bool]) {
+/// Keeps the entries whose flag is set.
+pub(super) fn retain_by<T>(list: &mut Vec<T>, is_kept: &[bool]) {
     let mut flags = is_kept.iter();
     list.retain(|_| flags.next().copied().unwrap_or(true));
 }

@@ -3,7 +3,7 @@
 //! Owns the walk. May use the tree. It deliberately knows no meaning: who visits says what to do.
 
 use crate::syntax::tree::{
-    Axis, Expr, ExprKind, Name, Range, StatementKind, SweepAxis, SweepEntry, SweepValue, Times,
+    Axis, Expr, ExprKind, Name, Range, Rate, StatementKind, SweepAxis, SweepEntry, SweepValue, Times,
 };
 
 /// What is done at each place.
@@ -22,7 +22,19 @@ pub(super) fn visit(kind: &mut StatementKind, visitor: &mut impl Visitor) {
             it.range.iter_mut().for_each(|it| range(it, visitor));
         }
         StatementKind::Function(it) => expression(&mut it.body, visitor),
-        StatementKind::Reaction(it) => expression(&mut it.rate, visitor),
+        StatementKind::Species(list) => {
+            let values = list.iter_mut().flat_map(|it| &mut it.qualifiers).filter_map(|it| it.value.as_mut());
+            values.for_each(|it| expression(it, visitor));
+        }
+        StatementKind::Reaction(it) => {
+            let terms = it.reactants.iter_mut().chain(&mut it.products);
+            terms.filter_map(|it| it.coefficient.as_mut()).for_each(|it| expression(it, visitor));
+            match &mut it.rate {
+                Rate::One(it) => expression(it, visitor),
+                Rate::Directions(list) => list.iter_mut().for_each(|it| expression(&mut it.value, visitor)),
+            }
+        }
+        StatementKind::Chemistry(list) => list.iter_mut().for_each(|it| expression(&mut it.value, visitor)),
         StatementKind::Domain(it) => {
             it.axes.iter_mut().for_each(|it| axis(it, visitor));
             it.frame.iter_mut().for_each(|it| expression(it, visitor));
@@ -64,7 +76,6 @@ pub(super) fn visit(kind: &mut StatementKind, visitor: &mut impl Visitor) {
         | StatementKind::Title(_)
         | StatementKind::Cite(_)
         | StatementKind::Seed(_)
-        | StatementKind::Species(_)
         | StatementKind::Boundary(_)
         | StatementKind::Use(_)
         | StatementKind::Report(_) => {}

@@ -137,6 +137,7 @@ fn is_keyword(rule: Rule) -> bool {
             | R::kw_boundary
             | R::kw_flow
             | R::kw_dispersion
+            | R::kw_chemistry
             | R::kw_mixing
             | R::kw_average
     ) || matches!(

@@ -10,8 +10,9 @@ use crate::source::{Span, Spanned};
 use crate::syntax::climb::Built;
 use crate::syntax::grammar::Rule;
 use crate::syntax::tree::{
-    Arrow, Assignment, Average, Axis, Boundary, Domain, Expr, Field, Flow, Function, Let, Measure, Output,
-    Param, Particles, Reaction, Reference, Run, Species, StatementKind, Target, Term, Times, Use, Zone,
+    Arrow, Assignment, Average, Axis, Boundary, Domain, Expr, ExprKind, Field, Flow, Function, Let, Measure,
+    Number, Output, Param, Particles, Qualifier, Rate, Reaction, Reference, Run, Species, StatementKind,
+    Target, Term, Times, UnaryOperator, Use, Zone,
 };
 use pest::iterators::Pair;
 
@@ -37,6 +38,7 @@ pub fn kind(mut parts: Parts, rule: Rule) -> Built<StatementKind> {
         }),
         Rule::species => S::Species(each(parts, Rule::species_item, species)?),
         Rule::reaction => S::Reaction(reaction(parts)?),
+        Rule::chemistry => S::Chemistry(each(parts, Rule::chemistry_setting, field)?),
         Rule::domain => S::Domain(domain(parts)?),
         Rule::boundary => S::Boundary(Boundary {
             sides: parts.names(Rule::side),
@@ -90,10 +92,48 @@ fn parameter(parts: &mut Parts) -> Built<Param> {
 
 fn species(parts: &mut Parts) -> Built<Species> {
     let name = parts.name()?;
-    let mut qualifiers = parts.names(Rule::qualifier);
+    let mut qualifiers = each(parts, Rule::qualifier, qualifier)?;
     let doc = parts.optional_text()?;
-    qualifiers.extend(parts.names(Rule::qualifier));
+    qualifiers.extend(each(parts, Rule::qualifier, qualifier)?);
     Ok(Species { name, qualifiers, doc })
+}
+
+fn qualifier(parts: &mut Parts) -> Built<Qualifier> {
+    let place = parts.place;
+    if let Some(pair) = parts.take(Rule::charge) {
+        let mut inner = Parts::of(place, pair);
+        let name = inner.need(Rule::charge_word)?;
+        let value = signed_number(place, inner.need(Rule::signed_number)?)?;
+        return Ok(Qualifier { name: spanned(place, &name), value: Some(value) });
+    }
+    if let Some(pair) = parts.take(Rule::ion_size) {
+        let mut inner = Parts::of(place, pair);
+        let name = inner.need(Rule::ion_size_word)?;
+        return Ok(Qualifier { name: spanned(place, &name), value: Some(inner.expression()?) });
+    }
+    Ok(Qualifier { name: parts.name()?, value: None })
+}
+
+/// `2`, `-1`: without a unit, since a further word may follow.
+fn signed_number(place: Place, pair: Pair<Rule>) -> Built<Expr> {
+    let span = span_at(place, &pair);
+    let text = pair.as_str();
+    let digits = text.trim_start_matches(['+', '-']).replace('_', "");
+    let sign_end = span.start + (text.len() - text.trim_start_matches(['+', '-']).len()) as u32;
+    let number = Expr {
+        span: Span { start: sign_end, ..span },
+        kind: ExprKind::Number(Number { digits, unit: None }),
+    };
+    if !text.starts_with('-') {
+        return Ok(Expr { span, ..number });
+    }
+    let operator = Spanned::new(UnaryOperator::Negate, Span { end: sign_end, ..span });
+    Ok(Expr { span, kind: ExprKind::Unary { operator, operand: Box::new(number) } })
+}
+
+/// Two words, the second a value: `rate 1 /d`, `tolerance 1e-6`.
+fn field(parts: &mut Parts) -> Built<Field> {
+    Ok(Field { name: parts.name()?, value: parts.expression()? })
 }
 
 fn reaction(parts: &mut Parts) -> Built<Reaction> {
@@ -103,17 +143,38 @@ fn reaction(parts: &mut Parts) -> Built<Reaction> {
     let direction = if arrow.as_str() == "->" { Arrow::Forward } else { Arrow::Both };
     let arrow = Spanned::new(direction, span_at(parts.place, &arrow));
     let products = side(parts, Rule::products)?;
-    Ok(Reaction { name, reactants, arrow, products, rate: parts.expression()? })
+    let place = parts.place;
+    let pair = parts.need(Rule::rate)?;
+    Ok(Reaction { name, reactants, arrow, products, rate: rate(&mut Parts::of(place, pair))? })
+}
+
+fn rate(parts: &mut Parts) -> Built<Rate> {
+    let directions = each(parts, Rule::direction, |parts| {
+        let word = parts.need(Rule::direction_word)?;
+        Ok(Field { name: spanned(parts.place, &word), value: parts.expression()? })
+    })?;
+    if directions.is_empty() { Ok(Rate::One(parts.expression()?)) } else { Ok(Rate::Directions(directions)) }
 }
 
 fn side(parts: &mut Parts, rule: Rule) -> Built<Vec<Term>> {
     let Some(pair) = parts.take(rule) else { return Ok(Vec::new()) };
     each(&mut Parts::of(parts.place, pair), Rule::term, |parts| {
         let place = parts.place;
-        let coefficient = parts.take(Rule::bare_number).map(|pair| spanned(place, &pair));
-        let coefficient = coefficient.map(|it| Spanned::new(it.value.replace('_', ""), it.span));
+        let coefficient = parts.take(Rule::coefficient).map(|pair| coefficient(place, pair)).transpose()?;
         Ok(Term { coefficient, species: parts.name()? })
     })
+}
+
+/// A number, or the name of one.
+fn coefficient(place: Place, pair: Pair<Rule>) -> Built<Expr> {
+    let mut inner = Parts::of(place, pair);
+    match inner.take(Rule::bare_number) {
+        Some(number) => bare_number(place, number),
+        None => {
+            let name = inner.name()?;
+            Ok(Expr { span: name.span, kind: ExprKind::Path(vec![name]) })
+        }
+    }
 }
 
 fn domain(parts: &mut Parts) -> Built<Domain> {
@@ -138,8 +199,7 @@ fn axis(parts: &mut Parts) -> Built<Axis> {
 
 fn zone(parts: &mut Parts) -> Built<Zone> {
     let name = parts.wrapped_name(Rule::label)?;
-    let fields =
-        each(parts, Rule::zone_field, |parts| Ok(Field { name: parts.name()?, value: parts.expression()? }))?;
+    let fields = each(parts, Rule::zone_field, field)?;
     Ok(Zone { name, fields })
 }
 

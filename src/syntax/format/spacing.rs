@@ -10,7 +10,8 @@ use crate::syntax::tree::TokenKind;
 use crate::syntax::words::RESERVED_WORDS;
 
 /// Words after which a minus is a sign.
-const BEFORE_VALUE: &[&str] = &["fraction", "rate", "moving", "to", "step", "dispersion", "uniform"];
+const BEFORE_VALUE: &[&str] =
+    &["fraction", "rate", "moving", "to", "step", "dispersion", "uniform", "charge", "forward", "backward"];
 
 /// The number of blanks before each token of a line; `keyword` is the first token of its statement.
 pub fn gaps(lexed: Lexed, line: &[usize], keyword: usize) -> Vec<usize> {
