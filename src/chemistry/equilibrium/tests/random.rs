@@ -1,0 +1,121 @@
+//! Ten thousand random systems.
+
+use super::{defect, power, primary, solve};
+use crate::chemistry::equilibrium::feasible::infeasible;
+use crate::chemistry::equilibrium::{Refusal, Speciation};
+use crate::maths::scalar::ln;
+use crate::plan::chemistry::{Activity, Equilibrium, Secondary};
+use rand_chacha::ChaCha12Rng;
+use rand_core::{Rng, SeedableRng};
+
+pub(super) struct Dice(ChaCha12Rng);
+
+impl Dice {
+    pub fn new(seed: u64) -> Self {
+        Self(ChaCha12Rng::seed_from_u64(seed))
+    }
+
+    pub fn below(&mut self, n: u64) -> u64 {
+        self.0.next_u64() % n
+    }
+
+    pub fn uniform(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
+
+/// Up to 8 primaries and 30 complexes, ν from −1 to 3, K over 40 decades, totals from 1e-16 to 10.
+pub(super) fn system(dice: &mut Dice) -> (Equilibrium, Vec<f64>) {
+    let n = 1 + dice.below(8) as usize;
+    let n_complexes = 1 + dice.below(30) as usize;
+    let mut secondaries = Vec::new();
+    for i in 0..n_complexes {
+        let mut coefficients = Vec::new();
+        for j in 0..n {
+            if dice.below(3) > 0 || n == 1 {
+                coefficients.push((j, dice.below(5) as f64 - 1.0));
+            }
+        }
+        coefficients.retain(|c| c.1 != 0.0);
+        let ln_constant = power(dice.uniform(-20.0, 20.0));
+        secondaries.push(Secondary { species: n + i, charge: 0.0, ion_size: 0.0, ln_constant, coefficients });
+    }
+    let primaries = (0..n).map(|j| primary(j, 0.0, 0.0)).collect();
+    let totals = (0..n)
+        .map(|_| {
+            let size = power(dice.uniform(-16.0, 1.0));
+            let size = crate::maths::scalar::exp(size);
+            match dice.below(12) {
+                0 => 0.0,
+                1 => -size,
+                _ => size,
+            }
+        })
+        .collect();
+    (Equilibrium { primaries, secondaries, minerals: Vec::new(), activity: Activity::Ideal }, totals)
+}
+
+/// `ln C − ln K − Σ ν ln c` of the worst complex, over the size of its terms; what is nearly nothing is left out.
+fn action(equilibrium: &Equilibrium, c: &[f64]) -> f64 {
+    let n = equilibrium.primaries.len();
+    let mut worst: f64 = 0.0;
+    for (row, value) in equilibrium.secondaries.iter().zip(&c[n..]) {
+        let is_little = |c: f64| c < 1e-240;
+        if is_little(*value) || row.coefficients.iter().any(|&(j, _)| is_little(c[j])) {
+            continue;
+        }
+        let terms = row.coefficients.iter().map(|&(j, nu)| -nu * ln(c[j]));
+        let terms: Vec<f64> = terms.chain([ln(*value), -row.ln_constant]).collect();
+        let size: f64 = terms.iter().map(|term| term.abs()).sum();
+        worst = worst.max(terms.iter().sum::<f64>().abs() / (1.0 + size));
+    }
+    worst
+}
+
+/// A direction along which all species only rise and the totals fall proves that there is no solution.
+fn is_proof(equilibrium: &Equilibrium, totals: &[f64], d: &[f64]) -> bool {
+    let along = |row: &[(usize, f64)]| row.iter().map(|&(j, nu)| nu * d[j]).sum::<f64>();
+    let rows = equilibrium.secondaries.iter().map(|s| along(&s.coefficients));
+    let size: f64 = d.iter().map(|d| d.abs()).fold(0.0, f64::max);
+    let is_rising = d.iter().copied().chain(rows).all(|rise| rise >= -1e-12 * size);
+    let (fall, terms) = totals
+        .iter()
+        .zip(d)
+        .fold((0.0, 0.0), |(sum, size), (total, d)| (sum + total * d, size + (total * d).abs()));
+    is_rising && fall < -1e-11 * terms
+}
+
+/// One of the ten thousand has solutions near 10¹⁵ mol/m³ that cancel to totals of 10⁻¹⁶, which numbers of 16
+/// digits cannot hold to 10⁻¹⁰: it is refused, with what is left.
+#[test]
+fn ten_thousand_random_systems_are_solved_or_refused_with_the_reason() {
+    let mut dice = Dice::new(20_261_124);
+    let (mut n_solved, mut n_infeasible, mut n_unsolved) = (0, 0, 0);
+    for idx in 0..10_000 {
+        let (equilibrium, totals) = system(&mut dice);
+        let speciation = Speciation::new(&equilibrium).unwrap();
+        let columns: Vec<Vec<f64>> = totals.iter().map(|&total| vec![total]).collect();
+        let found = solve(&speciation, &columns, None);
+        match found.effort {
+            Ok(_) => {
+                let c: Vec<f64> = found.concentrations.iter().map(|column| column[0]).collect();
+                assert!(c.iter().all(|c| *c >= 0.0 && c.is_finite()), "system {idx} {c:?}");
+                let (defect, action) = (defect(&equilibrium, &totals, &c), action(&equilibrium, &c));
+                assert!(defect <= 1e-10, "system {idx}: {defect}");
+                assert!(action <= 1e-13, "system {idx}: {action}");
+                n_solved += 1;
+            }
+            Err((_, Refusal::Infeasible)) => {
+                let proof = infeasible(&speciation.system, &totals).unwrap();
+                assert!(is_proof(&equilibrium, &totals, &proof), "system {idx}: {totals:?}, {proof:?}");
+                n_infeasible += 1;
+            }
+            Err((_, Refusal::NotSolved { residual })) => {
+                assert!(residual < 1e-9, "system {idx}: {residual}");
+                n_unsolved += 1;
+            }
+            Err(other) => panic!("system {idx}: {other:?}"),
+        }
+    }
+    assert_eq!((n_solved, n_infeasible, n_unsolved), (8480, 1519, 1));
+}
