@@ -65,6 +65,8 @@ struct Lane {
     grace: u8,
     /// Largest total.
     largest: f64,
+    /// Largest sum of the terms of a balance.
+    hottest: f64,
     /// Steps to go before logarithmic residuals are tried again.
     plain_left: u32,
 }
@@ -79,6 +81,7 @@ const IDLE: Lane = Lane {
     defect: f64::MAX,
     grace: 0,
     largest: 1.0,
+    hottest: 1.0,
     plain_left: 0,
 };
 
@@ -133,14 +136,17 @@ impl<const L: usize> Newton<L> {
         self.wish.is_hot[lane] = false;
     }
 
-    /// What would precipitate says nothing as long as some balance has terms far beyond all totals.
+    /// What would precipitate says nothing as long as some balance is far from solved and has terms far beyond
+    /// all totals.
     #[inline(always)]
     fn weigh(&mut self, lane: usize) {
         let mut hottest: f64 = 0.0;
         for size in &self.point.size {
             hottest = hottest.max(size[lane]);
         }
-        self.wish.is_hot[lane] = hottest > HOT * self.lanes[lane].largest;
+        let is_far = self.point.defect[lane] > FAR;
+        self.wish.is_hot[lane] = is_far && hottest > HOT * self.lanes[lane].largest;
+        self.lanes[lane].hottest = hottest;
     }
 
     #[inline(always)]
@@ -392,7 +398,7 @@ impl<const L: usize> Newton<L> {
             }
             merit += if counts { pull * pull / (2.0 * penalty) } else { 0.0 };
             self.old_amount[k][lane] = own;
-            let bound = HOT * penalty / self.settings.stiffness;
+            let bound = HOT * (penalty / self.settings.stiffness + self.lanes[lane].hottest);
             let amount = (own + part * self.direction.amount[k][lane]).clamp(-bound, bound);
             self.step_amount[k][lane] = amount - own;
             self.point.amount[k][lane] = amount;

@@ -1,10 +1,10 @@
 //! Ten thousand random systems.
 
-use super::{defect, power, primary, solve};
+use super::{defect, power, primary, solve, solve_one};
 use crate::chemistry::equilibrium::feasible::infeasible;
 use crate::chemistry::equilibrium::{Refusal, Speciation};
 use crate::maths::scalar::ln;
-use crate::plan::chemistry::{Activity, Equilibrium, Secondary};
+use crate::plan::chemistry::{Activity, Equilibrium, Mineral, Secondary};
 use rand_chacha::ChaCha12Rng;
 use rand_core::{Rng, SeedableRng};
 
@@ -118,4 +118,34 @@ fn ten_thousand_random_systems_are_solved_or_refused_with_the_reason() {
         }
     }
     assert_eq!((n_solved, n_infeasible, n_unsolved), (8480, 1519, 1));
+}
+/// A thousand waters with complexes over 40 decades and up to four minerals: balances, saturation, presence.
+#[test]
+fn random_systems_with_minerals_are_at_or_below_saturation() {
+    let mut dice = Dice::new(7);
+    let mut n_present = 0;
+    for idx in 0..1000 {
+        let (mut equilibrium, mut totals) = system(&mut dice);
+        totals.iter_mut().for_each(|total| *total = total.abs());
+        equilibrium.secondaries.iter_mut().for_each(|s| s.coefficients.retain(|c| c.1 > 0.0));
+        let n = totals.len() as u64;
+        for k in 0..=dice.below(4) {
+            let coefficients =
+                (0..n).map(|j| (j as usize, dice.below(3) as f64)).filter(|c| c.1 > 0.0).collect();
+            let ln_solubility = power(dice.uniform(-30.0, 0.0));
+            equilibrium.minerals.push(Mineral { species: 100 + k as usize, ln_solubility, coefficients });
+        }
+        equilibrium.minerals.retain(|mineral| !mineral.coefficients.is_empty());
+        let c = solve_one(&equilibrium, &totals).unwrap_or_else(|why| panic!("system {idx}: {why:?}"));
+        assert!(defect(&equilibrium, &totals, &c) <= 1e-10, "system {idx}");
+        let first = c.len() - equilibrium.minerals.len();
+        for (mineral, amount) in equilibrium.minerals.iter().zip(&c[first..]) {
+            let logs = mineral.coefficients.iter().map(|&(j, nu)| nu * ln(c[j]));
+            let index = logs.sum::<f64>() - mineral.ln_solubility;
+            assert!(*amount >= 0.0 && index < 1e-10, "system {idx}: {index}");
+            assert!(*amount == 0.0 || index.abs() < 1e-10, "system {idx}: {amount} {index}");
+            n_present += usize::from(*amount > 0.0);
+        }
+    }
+    assert!(n_present > 200);
 }
