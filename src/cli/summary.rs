@@ -267,6 +267,7 @@ mod tests {
 
     fn outcome() -> Outcome {
         Outcome {
+            labour: lamella::chemistry::Work::default(),
             n_steps: 755,
             n_particles: 1_000_000,
             mass_defect: vec![1e-15, 3e-15],

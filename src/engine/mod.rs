@@ -6,6 +6,7 @@
 mod amount;
 mod average;
 mod clock;
+mod conserved;
 mod control;
 mod error;
 mod initial;

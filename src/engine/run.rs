@@ -6,6 +6,7 @@
 use super::amount::{self, Amount};
 use super::average::{self, Means};
 use super::clock::Clock;
+use super::conserved;
 use super::control::{Control, Settings};
 use super::error::RunError;
 use super::observe::{self, Instant, Lab};
@@ -101,6 +102,7 @@ pub fn run<const D: usize>(
         n_steps: plan.time.n_steps,
         n_particles: plan.particles.count,
         mass_defect,
+        labour: run.reactions.labour,
         loop_wall,
         wall: clock.wall(),
         cpu: clock.cpu(),
@@ -358,7 +360,11 @@ impl<'a, const D: usize> Run<'a, D> {
         self.settle_pending(self.program.plan.time.n_steps.saturating_sub(1))?;
         let after: Vec<f64> =
             amount::amounts(&self.blocks, self.program.n_columns()).iter().map(|amount| amount.sum).collect();
-        Ok(amount::defects(&self.program, &self.before, &self.reactions.added, &after))
+        let mut defects = amount::defects(&self.program, &self.before, &self.reactions.added, &after);
+        defects.resize(self.program.plan.components.len(), 0.0);
+        let reacted = conserved::defects(&conserved::invariants(self.program.plan), &self.reactions.added);
+        defects.iter_mut().zip(reacted).for_each(|(own, other)| *own = amount::worse(*own, other));
+        Ok(defects)
     }
 }
 

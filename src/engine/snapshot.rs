@@ -1,6 +1,8 @@
 //! What the engine hands out: numbers at a time, nothing of files.
 //!
-//! Owns the shapes of observations. May use `plan`. It deliberately knows no Arrow.
+//! Owns the shapes of observations. May use `plan` and the counts of `chemistry`. It deliberately knows no Arrow.
+
+use crate::chemistry::Work;
 
 /// One observation of one output at one time.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,8 +65,11 @@ pub struct MixingState {
 pub struct Outcome {
     pub n_steps: u64,
     pub n_particles: u64,
-    /// Per component: |final − initial| / max(|initial|, Σ|values|) of the carried amount.
+    /// Per component: |final − initial| / max(|initial|, Σ|values|) of the carried amount, apart from what
+    /// reactions added; and how far these missed what they conserve.
     pub mass_defect: Vec<f64>,
+    /// Sub-steps and evaluations of what is integrated.
+    pub labour: Work,
     /// Wall and CPU seconds of the step loop and of everything the engine did.
     pub loop_wall: f64,
     pub wall: f64,

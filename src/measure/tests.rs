@@ -40,6 +40,7 @@ fn outcome() -> Outcome {
         n_steps: 755,
         n_particles: 1000,
         mass_defect: vec![1e-14, 3e-14, 2e-14],
+        labour: crate::chemistry::Work::default(),
         loop_wall: 1.0,
         wall: 1.5,
         cpu: 2.5,

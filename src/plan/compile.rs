@@ -4,7 +4,8 @@ use super::cost::{self, Cost};
 use super::evaluation::Evaluation;
 use super::limits::{self, Limit};
 use super::passes::{self, Draft, LeftOut};
-use super::{Plan, lower};
+use super::time_scales::TimeScales;
+use super::{Plan, integrator, lower};
 use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::L010;
 use crate::scenario::Scenario;
@@ -56,13 +57,15 @@ pub fn compile(scenario: &Scenario, options: &Options) -> (Option<Compiled>, Vec
         Ok(lowered) => lowered,
         Err(problems) => return (None, problems),
     };
+    let scales = TimeScales::of(&plan);
     let mut draft = Draft { plan, evaluation, left_out: Vec::new() };
     if let Err(reason) = draft.plan.check() {
         panic!("lowering made a plan that is not well-formed: {reason}");
     }
     passes::run(&mut draft, |pass| options.passes.takes(pass));
+    integrator::choose(&mut draft.plan, scales.as_ref());
     let cost = cost::estimate(&draft.plan);
-    let (limits, found) = limits::check(scenario, &draft, &cost, options.memory);
+    let (limits, found) = limits::check(scenario, &draft, scales.as_ref(), &cost, options.memory);
     let diagnostics = [warnings, found].concat();
     if crate::diagnostic::any_fatal(&diagnostics) {
         return (None, diagnostics);

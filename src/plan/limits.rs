@@ -5,7 +5,8 @@
 
 use super::cost::Cost;
 use super::passes::Draft;
-use super::{OutputKind, Plan, ZoneRate, edges};
+use super::time_scales::TimeScales;
+use super::{OutputKind, Plan, ZoneRate, edges, reaction_limits};
 use crate::diagnostic::codes::{N101, N102, N103, N104, N201, N202, N203, N301};
 use crate::diagnostic::{Diagnostic, number, precise};
 use crate::scenario::{self, MAX_BINS, Scenario};
@@ -36,6 +37,7 @@ const VISIBLE_SPREADING: f64 = 0.01;
 pub fn check(
     scenario: &Scenario,
     draft: &Draft,
+    scales: Option<&TimeScales>,
     cost: &Cost,
     memory: Option<u64>,
 ) -> (Vec<Limit>, Vec<Diagnostic>) {
@@ -49,6 +51,7 @@ pub fn check(
         exchange(scenario, plan, &mut limits, &mut diagnostics);
         numerical_dispersion(scenario, plan, &mut limits, &mut diagnostics);
     }
+    reaction_limits::check(scenario, plan, scales, &mut limits, &mut diagnostics);
     check_memory(scenario, plan, cost, memory, &mut diagnostics);
     (limits, diagnostics)
 }

@@ -14,12 +14,14 @@ mod edges;
 pub mod eliminate;
 pub mod evaluation;
 pub mod explain;
+mod integrator;
 mod law;
 pub mod limits;
 mod lower;
 mod lower_chemistry;
 mod method;
 pub mod passes;
+mod reaction_limits;
 pub mod tape;
 pub mod time_scales;
 

@@ -186,6 +186,8 @@ pub fn refresh(recorded: &mut Replicate, scenario: &Scenario, compiled: &Compile
     }
     let row = &recorded.row;
     let outcome = Outcome {
+        // Not kept: what is worked out again needs no counts.
+        labour: crate::chemistry::Work::default(),
         n_steps: row.steps,
         n_particles: row.particles,
         mass_defect: row.mass_defect.into_iter().collect(),

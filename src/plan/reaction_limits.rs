@@ -1,0 +1,166 @@
+//! Limits of reactions: how fast they are against the step, transport and exchange.
+//!
+//! Owns these numbers and verdicts. May use `scenario` for the places. It deliberately refuses no step for
+//! being long against a reaction: sub-steps resolve that, and taking turns with exchange is what is judged.
+
+use super::limits::{Limit, dispersion, short};
+use super::time_scales::TimeScales;
+use super::{Plan, ZoneRate, chemistry::Splitting};
+use crate::diagnostic::Diagnostic;
+use crate::diagnostic::codes::{N106, N201};
+use crate::scenario::Scenario;
+
+/// Relative error of taking turns above which it shows.
+const VISIBLE_SPLITTING: f64 = 0.1;
+
+/// Particles per bin below which what lives in bins meets too few.
+const FEW_PER_BIN: f64 = 10.0;
+
+pub(super) fn check(
+    scenario: &Scenario,
+    plan: &Plan,
+    scales: Option<&TimeScales>,
+    limits: &mut Vec<Limit>,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    if plan.has_immobile() {
+        particles_per_bin(scenario, plan, diagnostics);
+    }
+    let (Some(scales), Some(kinetics)) =
+        (scales, plan.chemistry.as_ref().and_then(|chemistry| chemistry.kinetics.as_ref()))
+    else {
+        return;
+    };
+    for (reaction, rate) in kinetics.reactions.iter().zip(&scales.rates).filter(|(_, rate)| **rate > 0.0) {
+        limits.push(Limit {
+            name: format!("time of reaction `{}` in s", reaction.name),
+            formula: "1 / |dr/dc . nu|, the shortest met",
+            value: 1.0 / rate,
+            advice: "any: sub-steps are as short as the tolerance asks",
+        });
+    }
+    let rate = scales.fastest_rate();
+    limits.push(Limit {
+        name: "fastest reaction per step".into(),
+        formula: "|dr/dc . nu| dt",
+        value: rate * plan.time.step,
+        advice: "above 5 integrators are implicit",
+    });
+    limits.push(Limit {
+        name: "stiffness".into(),
+        formula: "fastest reaction / slowest reaction",
+        value: scales.stiffness(),
+        advice: "any: implicit integrators do not mind",
+    });
+    damkohler(plan, rate, limits);
+    splitting(scenario, plan, scales, limits, diagnostics);
+}
+
+/// Fastest reaction against transport over the domain and against exchange.
+fn damkohler(plan: &Plan, rate: f64, limits: &mut Vec<Limit>) {
+    for (idx, axis) in plan.axes.iter().enumerate() {
+        let extent = axis.high - axis.low;
+        let (drift, spread) = (plan.walk.drift[idx].abs(), dispersion(plan, idx));
+        let name = ["x", "y", "z"][axis.index];
+        if drift > 0.0 {
+            limits.push(Limit {
+                name: format!("Damköhler number along {name}, against flow"),
+                formula: "|dr/dc . nu| extent / |v - v_frame|",
+                value: rate * extent / drift,
+                advice: "far above 1 mixing limits the reaction, far below it the rate does",
+            });
+        }
+        if spread > 0.0 {
+            limits.push(Limit {
+                name: format!("Damköhler number along {name}, against dispersion"),
+                formula: "|dr/dc . nu| extent^2 / D",
+                value: rate * extent * extent / spread,
+                advice: "far above 1 mixing limits the reaction, far below it the rate does",
+            });
+        }
+    }
+    for zone in plan.mixing.iter().flat_map(|mixing| &mixing.zones) {
+        let ZoneRate::Finite(exchange) = zone.rate else { continue };
+        if exchange > 0.0 {
+            limits.push(Limit {
+                name: format!("Damköhler number of zone `{}`", zone.name),
+                formula: "2 |dr/dc . nu| / chi",
+                value: 2.0 * rate / exchange,
+                advice: "far above 1 exchange limits the reaction, far below it the rate does",
+            });
+        }
+    }
+}
+
+/// What taking turns misses: exchange and reaction in one step, each without the other.
+///
+/// - Equation: `e = ½ η (χΔt/2) min(λΔt, 1)`; with symmetric splitting its square.
+/// - Symbols: η fraction and χ rate of the fastest zone that exchanges, λ the fastest reaction.
+/// - Dimensions and range: relative to what one step exchanges; an estimate of size, not a bound.
+/// - Source: the leading term ½Δt[T, R] of Lie splitting; methods, section 8.2.
+/// - Shape: one number.
+fn splitting(
+    scenario: &Scenario,
+    plan: &Plan,
+    scales: &TimeScales,
+    limits: &mut Vec<Limit>,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    let zones = plan.mixing.iter().flat_map(|mixing| &mixing.zones);
+    let exchange = zones.map(|zone| match zone.rate {
+        ZoneRate::Finite(rate) => 0.5 * zone.fraction * rate,
+        ZoneRate::Instant => 0.0,
+    });
+    let exchange = exchange.fold(0.0, f64::max);
+    if exchange == 0.0 {
+        return;
+    }
+    let (step, rate) = (plan.time.step, scales.fastest_rate());
+    let first_order = 0.5 * exchange * step * (rate * step).min(1.0);
+    let is_symmetric =
+        plan.chemistry.as_ref().is_some_and(|chemistry| chemistry.splitting == Splitting::Strang);
+    let value = if is_symmetric { first_order * first_order } else { first_order };
+    limits.push(Limit {
+        name: "splitting of exchange and reaction".into(),
+        formula: if is_symmetric { "(eta chi dt min(k dt, 1) / 4)^2" } else { "eta chi dt min(k dt, 1) / 4" },
+        value,
+        advice: "relative to what a step exchanges; below 0.1",
+    });
+    if value <= VISIBLE_SPLITTING {
+        return;
+    }
+    let needed = step * VISIBLE_SPLITTING / value;
+    let mut message = Diagnostic::warning(N106, "the step is coarse for exchange and reaction in turns")
+        .at(scenario.run.step_span, format!("{} s", short(step)))
+        .found(format!("an error of about {} of what a step exchanges", short(value)))
+        .expected(format!("at most {VISIBLE_SPLITTING}"))
+        .help(format!("use `step {} s` or less, or `chemistry order 2`", short(needed)));
+    let name =
+        plan.chemistry.as_ref().and_then(|c| c.kinetics.as_ref()).map(|k| &k.reactions[scales.fastest].name);
+    let written = name.and_then(|name| {
+        let own = name.split('.').next().unwrap_or(name);
+        scenario.reactions.iter().find(|reaction| reaction.name == *name || reaction.name == own)
+    });
+    if let Some(reaction) = written {
+        message = message.also(reaction.span, format!("the fastest reaction: 1/k = {} s", short(1.0 / rate)));
+    }
+    diagnostics.push(message);
+}
+
+fn particles_per_bin(scenario: &Scenario, plan: &Plan, diagnostics: &mut Vec<Diagnostic>) {
+    let n_bins: f64 = plan.axes.iter().map(|axis| axis.bins as f64).product();
+    let per_bin = plan.particles.count as f64 / n_bins;
+    let is_moving = plan.walk.drift.iter().chain(&plan.walk.spread).any(|entry| *entry != 0.0);
+    if per_bin >= FEW_PER_BIN || !is_moving && per_bin >= 1.0 {
+        return;
+    }
+    let span = scenario.bins.as_ref().map_or(scenario.domain.span, |bins| bins.span);
+    diagnostics.push(
+        Diagnostic::refused(N201, "what is immobile meets too few particles")
+            .at(span, format!("{n_bins} bins"))
+            .also(scenario.particles.count_span, format!("{} particles", plan.particles.count))
+            .found(format!("{} particles per bin", short(per_bin)))
+            .expected(format!("at least {FEW_PER_BIN}"))
+            .help(format!("use at least {} particles, or fewer bins", (n_bins * FEW_PER_BIN).ceil())),
+    );
+}
