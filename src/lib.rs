@@ -14,6 +14,7 @@ pub mod report;
 pub mod scenario;
 pub mod source;
 pub mod state;
+pub mod stress;
 pub mod sweep;
 pub mod syntax;
 pub mod table;

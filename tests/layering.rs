@@ -13,6 +13,7 @@ const LAYERS: &[&[&str]] = &[
     &["plan"],
     &["chemistry"],
     &["engine"],
+    &["stress"],
     &["table"],
     &["measure"],
     &["report"],

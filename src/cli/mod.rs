@@ -19,6 +19,7 @@ mod progress;
 mod record;
 mod report;
 mod run;
+mod stress;
 mod summary;
 mod sweep;
 mod sweep_folder;
@@ -85,6 +86,7 @@ enum Command {
     Gather(sweep_folder::GatherArguments),
     Status(sweep_folder::StatusArguments),
     Report(report::Arguments),
+    Stress(stress::Arguments),
     Why(why::Arguments),
     Verify(verify::Arguments),
     Repro(verify::ReproArguments),
@@ -129,6 +131,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Sweep(sweep) => sweep::run(sweep, &terminal),
         Command::Gather(gather) => sweep_folder::gather(gather, &terminal),
         Command::Status(status) => sweep_folder::status(status, &terminal),
+        Command::Stress(stress) => stress::run(stress, &terminal),
         Command::Report(report) => report::run(report, &terminal),
         Command::Why(why) => why::run(why, &terminal),
         Command::Verify(verify) => verify::run(verify, &terminal),

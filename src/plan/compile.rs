@@ -7,7 +7,7 @@ use super::passes::{self, Draft, LeftOut};
 use super::time_scales::TimeScales;
 use super::{Plan, integrator, lower};
 use crate::diagnostic::Diagnostic;
-use crate::diagnostic::codes::L010;
+use crate::diagnostic::codes::{L010, M005};
 use crate::scenario::Scenario;
 
 /// How to compile.
@@ -53,10 +53,41 @@ pub struct Compiled {
 
 /// Compiles a scenario. The plan is absent if a limit refuses it.
 pub fn compile(scenario: &Scenario, options: &Options) -> (Option<Compiled>, Vec<Diagnostic>) {
-    let (plan, evaluation, warnings) = match lower::lower(scenario) {
+    compile_from(scenario, options, None)
+}
+
+/// A change of a plan.
+pub type Edit<'e> = &'e dyn Fn(&mut Plan);
+
+/// The same with a change of the plan before anything is decided from it. An edit that leaves numbers
+/// which are none is refused.
+pub fn compile_edited(
+    scenario: &Scenario,
+    options: &Options,
+    edit: Edit<'_>,
+) -> (Option<Compiled>, Vec<Diagnostic>) {
+    compile_from(scenario, options, Some(edit))
+}
+
+fn compile_from(
+    scenario: &Scenario,
+    options: &Options,
+    edit: Option<Edit<'_>>,
+) -> (Option<Compiled>, Vec<Diagnostic>) {
+    let (mut plan, evaluation, warnings) = match lower::lower(scenario) {
         Ok(lowered) => lowered,
         Err(problems) => return (None, problems),
     };
+    if let Some(edit) = edit {
+        edit(&mut plan);
+        if let Err(reason) = plan.check() {
+            let message = Diagnostic::refused(M005, "a number of the plan is out of range")
+                .at(scenario.run.step_span, "with the quantities of this run")
+                .found(reason)
+                .expected("sizes that numbers can hold");
+            return (None, vec![message]);
+        }
+    }
     let scales = TimeScales::of(&plan);
     let mut draft = Draft { plan, evaluation, left_out: Vec::new() };
     if let Err(reason) = draft.plan.check() {

@@ -42,6 +42,9 @@ impl TimeScales {
     /// initial values is no number.
     pub fn of(plan: &Plan) -> Option<Self> {
         let chemistry = plan.chemistry.as_ref().filter(|chemistry| chemistry.equilibrium.is_none())?;
+        if !plan.reacts_in_steps() {
+            return None;
+        }
         let kinetics = chemistry.kinetics.as_ref()?;
         let network = Network { plan, kinetics };
         let states = network.states();

@@ -106,7 +106,7 @@ fn species_or_pair(a: &str, b: Option<&str>) -> String {
     b.map_or_else(|| a.to_owned(), |b| format!("{a}, {b}"))
 }
 
-fn words<'a>(texts: impl Iterator<Item = Option<&'a str>>) -> ArrayRef {
+pub(super) fn words<'a>(texts: impl Iterator<Item = Option<&'a str>>) -> ArrayRef {
     let mut builder = StringDictionaryBuilder::<UInt16Type>::new();
     texts.for_each(|text| builder.append_option(text));
     Arc::new(builder.finish())

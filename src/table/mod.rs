@@ -16,6 +16,7 @@ mod rows;
 pub mod scan;
 mod schema;
 mod sheet;
+mod stress;
 mod unit;
 mod writer;
 
@@ -29,5 +30,6 @@ pub use record::{
     ErrorBarRow, ErrorRow, Norms, Parameter, PointRow, Record, Status, Swept, SweptValue, Value,
 };
 pub use schema::Kind;
+pub use stress::{StressRow, write_stress};
 pub use unit::{ValueUnit, integrated, si_text, value_dimension, value_unit};
 pub use writer::{Summary, Writer, WrittenFile};

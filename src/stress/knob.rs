@@ -1,0 +1,184 @@
+//! What is turned in a stress test, and by how much.
+//!
+//! Owns the changes of a plan. May use the plan. It deliberately leaves the text of the scene alone: what
+//! is refused is refused at the lines as they stand.
+
+use crate::plan::Plan;
+use crate::plan::tape::{Binary, Operation, Register};
+use crate::plan::{Component, ZoneRate, chemistry};
+
+/// A quantity of a scene that is multiplied.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Knob {
+    /// All rates of reactions.
+    Rates,
+    /// All initial concentrations.
+    Concentrations,
+    /// Half-saturation constants: K in `c / (K + c)` and the like.
+    HalfSaturation,
+    /// Equilibrium constants.
+    Equilibrium,
+    /// Advection against dispersion: the dispersion is divided.
+    Peclet,
+    /// Reaction against transport: flow, dispersion and exchange are divided.
+    Damkohler,
+    /// The step.
+    Step,
+}
+
+impl Knob {
+    pub const ALL: [Self; 7] = [
+        Self::Rates,
+        Self::Concentrations,
+        Self::HalfSaturation,
+        Self::Equilibrium,
+        Self::Peclet,
+        Self::Damkohler,
+        Self::Step,
+    ];
+
+    /// As it is written on the command line and in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Rates => "rates",
+            Self::Concentrations => "concentrations",
+            Self::HalfSaturation => "half_saturation",
+            Self::Equilibrium => "equilibrium",
+            Self::Peclet => "peclet",
+            Self::Damkohler => "damkohler",
+            Self::Step => "step",
+        }
+    }
+
+    /// Whether the plan has anything to turn.
+    pub fn is_in(self, plan: &Plan) -> bool {
+        let kinetics = plan.chemistry.as_ref().and_then(|chemistry| chemistry.kinetics.as_ref());
+        let equilibrium = plan.chemistry.as_ref().and_then(|chemistry| chemistry.equilibrium.as_ref());
+        let is_moving = plan.walk.drift.iter().chain(&plan.walk.spread).any(|entry| *entry != 0.0);
+        match self {
+            Self::Rates => kinetics.is_some(),
+            Self::Concentrations => !plan.components.is_empty(),
+            Self::HalfSaturation => {
+                kinetics.is_some_and(|kinetics| !half_saturations(&kinetics.laws.operations).is_empty())
+            }
+            Self::Equilibrium => equilibrium.is_some(),
+            Self::Peclet => plan.walk.spread.iter().any(|entry| *entry != 0.0),
+            Self::Damkohler => {
+                (kinetics.is_some() || equilibrium.is_some()) && (is_moving || exchanges(plan))
+            }
+            Self::Step => true,
+        }
+    }
+
+    /// Multiplies the quantity in a plan that was lowered and not yet passed on.
+    pub fn turn(self, plan: &mut Plan, factor: f64) {
+        match self {
+            Self::Rates => multiply_rates(plan, factor),
+            Self::Concentrations => {
+                plan.components.iter_mut().for_each(|component| multiply_initial(component, factor));
+                if let Some(chemistry) = &mut plan.chemistry {
+                    chemistry.floors.iter_mut().for_each(|floor| *floor *= factor);
+                }
+            }
+            Self::HalfSaturation => multiply_half_saturations(plan, factor),
+            Self::Equilibrium => {
+                let equilibrium =
+                    plan.chemistry.as_mut().and_then(|chemistry| chemistry.equilibrium.as_mut());
+                let Some(equilibrium) = equilibrium else { return };
+                let shift = crate::maths::scalar::ln(factor);
+                equilibrium.secondaries.iter_mut().for_each(|secondary| secondary.ln_constant += shift);
+                equilibrium.minerals.iter_mut().for_each(|mineral| mineral.ln_solubility += shift);
+            }
+            Self::Peclet => {
+                let root = factor.sqrt();
+                plan.walk.spread.iter_mut().for_each(|entry| *entry /= root);
+            }
+            Self::Damkohler => {
+                let root = factor.sqrt();
+                plan.walk.drift.iter_mut().for_each(|entry| *entry /= factor);
+                plan.walk.spread.iter_mut().for_each(|entry| *entry /= root);
+                for zone in plan.mixing.iter_mut().flat_map(|mixing| &mut mixing.zones) {
+                    if let ZoneRate::Finite(rate) = &mut zone.rate {
+                        *rate /= factor;
+                    }
+                }
+            }
+            Self::Step => {
+                let time = &mut plan.time;
+                time.step = (time.step * factor).min(time.duration);
+                let exact = time.duration / time.step;
+                let is_whole = (exact - exact.round()).abs() < 1e-9 * exact.max(1.0);
+                let n_steps = if is_whole { exact.round() } else { exact.ceil() };
+                time.n_steps = (n_steps as u64).max(1);
+            }
+        }
+    }
+}
+
+fn exchanges(plan: &Plan) -> bool {
+    let mut zones = plan.mixing.iter().flat_map(|mixing| &mixing.zones);
+    zones.any(|zone| matches!(zone.rate, ZoneRate::Finite(rate) if rate > 0.0))
+}
+
+fn multiply_initial(component: &mut Component, factor: f64) {
+    let operations = &mut component.initial.operations;
+    let result = (operations.len() - 1) as Register;
+    operations.push(Operation::Constant(factor));
+    operations.push(Operation::Binary(Binary::Multiply, result, result + 1));
+}
+
+fn multiply_rates(plan: &mut Plan, factor: f64) {
+    let Some(kinetics) = plan.chemistry.as_mut().and_then(|chemistry| chemistry.kinetics.as_mut()) else {
+        return;
+    };
+    let operations = &mut kinetics.laws.operations;
+    let multiplier = operations.len() as Register;
+    operations.push(Operation::Constant(factor));
+    for rate in &mut kinetics.laws.rates {
+        let result = operations.len() as Register;
+        operations.push(Operation::Binary(Binary::Multiply, *rate, multiplier));
+        *rate = result;
+    }
+    for reaction in &mut kinetics.reactions {
+        match &mut reaction.law {
+            chemistry::Law::MassAction { constant, .. } => *constant *= factor,
+            chemistry::Law::Saturation { maximum, .. } => *maximum *= factor,
+            chemistry::Law::Expression => {}
+        }
+    }
+}
+
+/// Constants that are added to something in a denominator.
+fn half_saturations(operations: &[Operation]) -> Vec<usize> {
+    let is_constant =
+        |register: Register| matches!(operations[usize::from(register)], Operation::Constant(_));
+    let mut found = Vec::new();
+    for operation in operations {
+        let Operation::Binary(Binary::Divide, _, below) = *operation else { continue };
+        let Operation::Binary(Binary::Add, a, b) = operations[usize::from(below)] else { continue };
+        let own = [a, b].into_iter().filter(|&register| is_constant(register)).map(usize::from);
+        found.extend(own.filter(|&register| match operations[register] {
+            Operation::Constant(value) => value > 0.0,
+            _ => false,
+        }));
+    }
+    found.sort_unstable();
+    found.dedup();
+    found
+}
+
+fn multiply_half_saturations(plan: &mut Plan, factor: f64) {
+    let Some(kinetics) = plan.chemistry.as_mut().and_then(|chemistry| chemistry.kinetics.as_mut()) else {
+        return;
+    };
+    for register in half_saturations(&kinetics.laws.operations) {
+        if let Operation::Constant(value) = &mut kinetics.laws.operations[register] {
+            *value *= factor;
+        }
+    }
+    for reaction in &mut kinetics.reactions {
+        if let chemistry::Law::Saturation { half, .. } = &mut reaction.law {
+            *half *= factor;
+        }
+    }
+}

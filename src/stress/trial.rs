@@ -1,0 +1,231 @@
+//! One trial: compiled, run small, and judged.
+//!
+//! Owns the verdict. May use the plan and the engine. It deliberately stops what takes too long.
+
+use super::Knob;
+use crate::diagnostic::{Diagnostic, Severity};
+use crate::engine::snapshot::{Outcome, Snapshot, Values};
+use crate::engine::{Control, RunError, Settings, run};
+use crate::plan::Plan;
+use crate::plan::compile::{Compiled, Options, compile_edited};
+use crate::scenario::Scenario;
+use std::time::{Duration, Instant};
+
+/// A tolerance this much tighter tells the error of the one that is asked for.
+const TIGHTER: f64 = 1e-2;
+
+/// Tighter tolerances are not asked for.
+const TIGHTEST: f64 = 1e-13;
+
+/// How much a trial may take.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounds {
+    /// Particles at most, but as many as the bins need.
+    pub particles: u64,
+    /// Wall time of a run.
+    pub time: Duration,
+}
+
+/// A knob turned by a power of ten.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Trial {
+    pub knob: Knob,
+    pub decades: i32,
+}
+
+/// How a trial ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fate {
+    Finished,
+    /// The plan was refused at a line.
+    Refused,
+    /// The run stopped with a reason.
+    Stopped,
+    /// Not run, or cut short, for its time.
+    TooLong,
+}
+
+impl Fate {
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Finished => "finished",
+            Self::Refused => "refused",
+            Self::Stopped => "stopped",
+            Self::TooLong => "too_long",
+        }
+    }
+}
+
+/// What is told of a trial.
+#[derive(Debug, Clone)]
+pub struct Verdict {
+    pub trial: Trial,
+    pub fate: Fate,
+    /// What refused it, with its place.
+    pub message: Option<Diagnostic>,
+    /// What stopped it, or why it was not run.
+    pub reason: Option<String>,
+    pub wall: f64,
+    pub cpu: f64,
+    pub steps: u64,
+    pub particles: u64,
+    pub sub_steps: u64,
+    pub mass_defect: Option<f64>,
+    /// Smallest concentration that was observed, over the largest.
+    pub lowest: Option<f64>,
+    /// Difference to a run with a hundredth of the tolerance, over the size of the outputs; `None` if
+    /// nothing is integrated with error control.
+    pub error: Option<f64>,
+}
+
+impl Trial {
+    /// All trials of a scene: each knob that it has by `-decades ..= decades`, in steps of `every`.
+    pub fn all(plan: &Plan, knobs: &[Knob], decades: i32, every: i32) -> Vec<Self> {
+        let of_knob = |&knob: &Knob| {
+            let n = decades / every.max(1);
+            (-n..=n).map(move |k| Self { knob, decades: k * every.max(1) })
+        };
+        knobs.iter().filter(|knob| knob.is_in(plan)).flat_map(of_knob).collect()
+    }
+
+    /// Runs the trial.
+    pub fn run(self, scenario: &Scenario, options: &Options, bounds: &Bounds) -> Verdict {
+        let mut verdict = Verdict::new(self);
+        let factor = power_of_ten(self.decades);
+        let compiled = compile_edited(scenario, options, &|plan| {
+            self.knob.turn(plan, factor);
+            shrink(plan, bounds.particles);
+        });
+        let (compiled, diagnostics) = compiled;
+        let Some(compiled) = compiled else {
+            verdict.fate = Fate::Refused;
+            let is_fatal =
+                |message: &&Diagnostic| matches!(message.severity, Severity::Error | Severity::Refused);
+            verdict.message = diagnostics.iter().find(is_fatal).cloned();
+            return verdict;
+        };
+        verdict.particles = compiled.plan.particles.count;
+        verdict.steps = compiled.plan.time.n_steps;
+        if compiled.cost.cpu_seconds > 10.0 * bounds.time.as_secs_f64() {
+            verdict.fate = Fate::TooLong;
+            verdict.reason = Some(format!("not run: about {:.1e} s", compiled.cost.cpu_seconds));
+            return verdict;
+        }
+        verdict.take(&compiled, bounds);
+        verdict
+    }
+}
+
+/// As few particles as the bins and the trial need, each of more fluid.
+fn shrink(plan: &mut Plan, particles: u64) {
+    const PER_BIN: u64 = 100;
+    let n_bins: u64 = plan.axes.iter().map(|axis| axis.bins as u64).product();
+    let needed = if n_bins > 1 { n_bins.saturating_mul(PER_BIN) } else { 1 };
+    let count = particles.max(needed).min(plan.particles.count);
+    plan.particles.volume *= plan.particles.count as f64 / count as f64;
+    plan.particles.count = count;
+}
+
+/// Exact for what numbers can hold.
+fn power_of_ten(decades: i32) -> f64 {
+    format!("1e{decades}").parse().unwrap_or(f64::NAN)
+}
+
+impl Verdict {
+    fn new(trial: Trial) -> Self {
+        Self {
+            trial,
+            fate: Fate::Finished,
+            message: None,
+            reason: None,
+            wall: 0.0,
+            cpu: 0.0,
+            steps: 0,
+            particles: 0,
+            sub_steps: 0,
+            mass_defect: None,
+            lowest: None,
+            error: None,
+        }
+    }
+
+    fn take(&mut self, compiled: &Compiled, bounds: &Bounds) {
+        let begin = Instant::now();
+        let result = finish(&compiled.plan, bounds.time);
+        self.wall = begin.elapsed().as_secs_f64();
+        let (outcome, snapshots) = match result {
+            Ok(finished) => finished,
+            Err(RunError::Cancelled) => {
+                self.fate = Fate::TooLong;
+                self.reason = Some(format!("cut short after {:.1} s", bounds.time.as_secs_f64()));
+                return;
+            }
+            Err(error) => {
+                self.fate = Fate::Stopped;
+                self.reason = Some(error.to_string());
+                return;
+            }
+        };
+        self.cpu = outcome.cpu;
+        self.sub_steps = outcome.labour.steps;
+        self.mass_defect = Some(outcome.worst_defect());
+        let (lowest, highest) = extremes(&snapshots);
+        self.lowest = (highest > 0.0).then_some(lowest / highest);
+        self.error = tolerance_error(&compiled.plan, &snapshots, bounds.time);
+    }
+}
+
+/// Stops a run at its deadline.
+struct Deadline(Instant);
+
+impl Control for Deadline {
+    fn step_done(&self, _step: u64, _n_steps: u64) {}
+
+    fn is_cancelled(&self) -> bool {
+        Instant::now() > self.0
+    }
+}
+
+fn finish(plan: &Plan, time: Duration) -> Result<(Outcome, Vec<Snapshot>), RunError> {
+    let mut snapshots = Vec::new();
+    let outcome = run(plan, &Settings::default(), &Deadline(Instant::now() + time), &mut |snapshot| {
+        snapshots.push(snapshot);
+        Ok(())
+    })?;
+    Ok((outcome, snapshots))
+}
+
+/// All concentrations that were observed.
+fn concentrations(snapshots: &[Snapshot]) -> impl Iterator<Item = f64> {
+    let of = |snapshot: &Snapshot| -> Vec<f64> {
+        match &snapshot.values {
+            Values::Binned { mean: columns, .. } | Values::Particles { concentrations: columns, .. } => {
+                columns.concat()
+            }
+            Values::Total { amount } => amount.clone(),
+            Values::Covariance { .. } | Values::Mixing(_) => Vec::new(),
+        }
+    };
+    snapshots.iter().flat_map(of).filter(|value| !value.is_nan())
+}
+
+fn extremes(snapshots: &[Snapshot]) -> (f64, f64) {
+    concentrations(snapshots)
+        .fold((f64::INFINITY, 0.0), |(lowest, highest), value| (lowest.min(value), highest.max(value.abs())))
+}
+
+/// Relative difference, root of sums of squares, to a run with a tighter tolerance.
+fn tolerance_error(plan: &Plan, snapshots: &[Snapshot], time: Duration) -> Option<f64> {
+    let mut tighter = plan.clone();
+    let chemistry = tighter.chemistry.as_mut()?;
+    chemistry.kinetics.as_ref()?;
+    chemistry.tolerance = (chemistry.tolerance * TIGHTER).max(TIGHTEST);
+    chemistry.floors.iter_mut().for_each(|floor| *floor *= TIGHTER);
+    let (_, reference) = finish(&tighter, time).ok()?;
+    let (mut difference, mut size) = (0.0, 0.0);
+    for (own, other) in concentrations(snapshots).zip(concentrations(&reference)) {
+        difference += (own - other) * (own - other);
+        size += other * other;
+    }
+    (size > 0.0).then(|| (difference / size).sqrt())
+}
