@@ -201,6 +201,7 @@ fn item_solution<'a>(
         let dimension = match argument.dimension {
             ArgumentDimension::Fixed(dimension) => Some(dimension),
             ArgumentDimension::Concentration => concentration,
+            ArgumentDimension::ConcentrationPerTime => concentration.map(|own| own.over(Dimension::TIME)),
         };
         let Some(written) = written else {
             match argument.default {

@@ -56,6 +56,7 @@ fn outputs(predicts: Predicts) -> &'static str {
 fn unit(argument: &Argument) -> &'static str {
     match argument.dimension {
         ArgumentDimension::Concentration => "mol/m³ or kg/m³",
+        ArgumentDimension::ConcentrationPerTime => "mol/m³/s or kg/m³/s",
         ArgumentDimension::Fixed(Dimension::NONE) => "–",
         ArgumentDimension::Fixed(Dimension::LENGTH) => "m",
         ArgumentDimension::Fixed(Dimension::RATE) => "1/s",

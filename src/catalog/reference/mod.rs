@@ -13,6 +13,7 @@ mod gaussian_pulse;
 mod inflow;
 #[cfg(test)]
 mod manual;
+mod michaelis_menten;
 mod pulse_covariance;
 mod pulse_gamma;
 mod solutions;
@@ -42,6 +43,7 @@ pub const ALL: &[Item] = &[
     pulse_gamma::ITEM,
     inflow::OGATA_BANKS,
     inflow::CAUCHY_INFLOW,
+    michaelis_menten::ITEM,
 ];
 
 /// The item of that name.
@@ -62,11 +64,13 @@ pub struct Argument {
 }
 
 /// The dimension a slot asks for.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ArgumentDimension {
     Fixed(Dimension),
     /// mol/volume or mass/volume: whichever the species has.
     Concentration,
+    /// The same per time.
+    ConcentrationPerTime,
 }
 
 /// What a reference predicts, and thereby which output it is compared with.

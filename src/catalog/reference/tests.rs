@@ -19,6 +19,8 @@ fn plain_value(name: &str) -> f64 {
         "chi" | "chi1" => 1e-3,
         "velocity" => 1e-4,
         "width" => 0.01,
+        "V" => 1e-3,
+        "K" => 0.4,
         other => panic!("give the argument `{other}` a value for tests"),
     }
 }
@@ -124,7 +126,9 @@ fn concentrations_scale_with_the_concentration() {
         };
         let mut scaled = sample(item);
         for (value, argument) in scaled.iter_mut().zip(item.arguments) {
-            if matches!(argument.dimension, ArgumentDimension::Concentration) {
+            let of_concentration =
+                [ArgumentDimension::Concentration, ArgumentDimension::ConcentrationPerTime];
+            if of_concentration.contains(&argument.dimension) {
                 *value *= 4.0;
             }
         }
