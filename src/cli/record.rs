@@ -110,6 +110,7 @@ pub(crate) fn point(
         step: plan.time.step,
         duration: plan.time.duration,
         steps: outcome.n_steps,
+        sub_steps: outcome.sub_steps(),
         mass_defect: (!outcome.mass_defect.is_empty()).then(|| outcome.worst_defect()),
         values,
         version: VERSION.to_owned(),

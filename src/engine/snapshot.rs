@@ -79,6 +79,11 @@ pub struct Outcome {
 }
 
 impl Outcome {
+    /// Accepted sub-steps; `None` if nothing is integrated.
+    pub fn sub_steps(&self) -> Option<u64> {
+        (self.labour.steps > 0).then_some(self.labour.steps)
+    }
+
     /// The largest defect of all components; not a number if one of them is none.
     pub fn worst_defect(&self) -> f64 {
         self.mass_defect.iter().copied().fold(0.0, super::amount::worse)

@@ -2,6 +2,7 @@
 
 use super::compile::Compiled;
 use super::cost::n_stored_values;
+use super::explain_reactions;
 use super::{Normals, Plan, Quantity, Stage, ZoneRate};
 use crate::diagnostic::number;
 use std::fmt::Write as _;
@@ -17,6 +18,7 @@ pub fn explain(compiled: &Compiled, name: &str, title: Option<&str>) -> String {
     section(&mut text, "what runs", &scene_lines(&compiled.plan));
     section(&mut text, "each step, in this order", &step_lines(compiled));
     section(&mut text, "what particles carry", &field_lines(&compiled.plan));
+    section(&mut text, "reactions", &explain_reactions::lines(&compiled.plan));
     section(&mut text, "outputs", &output_lines(&compiled.plan));
     section(&mut text, "what it costs", &cost_lines(compiled));
     section(&mut text, "limits", &limit_lines(compiled));
@@ -115,13 +117,15 @@ fn step_lines(compiled: &Compiled) -> Vec<String> {
 fn field_lines(plan: &Plan) -> Vec<String> {
     let mut lines = Vec::new();
     let n_values = n_stored_values(plan);
-    let names: Vec<&str> = plan.components.iter().map(|component| component.name.as_str()).collect();
+    let carried = plan.components.iter().filter(|component| !component.is_immobile);
+    let names: Vec<&str> = carried.map(|component| component.name.as_str()).collect();
     if names.is_empty() {
         lines.push("positions only".to_owned());
     } else {
         let values = if n_values == 1 { "one value".to_owned() } else { format!("{n_values} values") };
         lines.push(format!("{}: {values} each, beside the position", names.join(", ")));
     }
+    lines.extend(explain_reactions::immobile_line(plan));
     if let Some(mixing) = &plan.mixing {
         for zone in &mixing.zones {
             let rate = match zone.rate {

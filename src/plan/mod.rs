@@ -14,6 +14,7 @@ mod edges;
 pub mod eliminate;
 pub mod evaluation;
 pub mod explain;
+mod explain_reactions;
 mod integrator;
 mod law;
 pub mod limits;

@@ -55,7 +55,7 @@ structs! {
     }
     PointRow {
         point, replicate, key, swept, seed, status, error_code, error_message, wall, loop_wall, cpu,
-        compile_wall, write_wall, peak_memory, particles, step, duration, steps, mass_defect, values, version,
+        compile_wall, write_wall, peak_memory, particles, step, duration, steps, sub_steps, mass_defect, values, version,
         numerics, host, threads, started, finished,
     }
 }

@@ -400,6 +400,7 @@ fn refused_row(version: &str) -> PointRow {
         step: f64::NAN,
         duration: f64::NAN,
         steps: 0,
+        sub_steps: None,
         mass_defect: None,
         values: Vec::new(),
         version: version.to_owned(),

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// Begins every frame.
-const MAGIC: [u8; 4] = *b"LmJ1";
+const MAGIC: [u8; 4] = *b"LmJ2";
 
 /// Magic, kind, length.
 const HEAD: usize = 16;

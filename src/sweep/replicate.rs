@@ -128,6 +128,7 @@ impl Task<'_> {
             step: plan.time.step,
             duration: plan.time.duration,
             steps: plan.time.n_steps,
+            sub_steps: None,
             mass_defect: None,
             values: Vec::new(),
             version: around.version.clone(),
@@ -143,6 +144,7 @@ impl Task<'_> {
 fn fill(row: &mut PointRow, outcome: &Outcome) {
     (row.wall, row.loop_wall, row.cpu) = (outcome.wall, outcome.loop_wall, outcome.cpu);
     row.steps = outcome.n_steps;
+    row.sub_steps = outcome.sub_steps();
     row.mass_defect = (!outcome.mass_defect.is_empty()).then(|| outcome.worst_defect());
 }
 

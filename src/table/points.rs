@@ -187,6 +187,9 @@ impl Table<'_> {
         self.seconds("step", "time step", |row| Some(row.step));
         self.seconds("duration", "simulated time", |row| Some(row.duration));
         self.count64("steps", Measured::Unitless, "number of steps", |row| Some(row.steps));
+        let doc =
+            "accepted sub-steps of the integrator, all particles together; null if nothing is integrated";
+        self.count64("sub_steps", Measured::Unitless, doc, |row| row.sub_steps);
         let product = |row: &PointRow| row.particles.checked_mul(row.steps);
         self.count64("particle_steps", Measured::Unitless, "particles times steps", product);
         let ratio = Measured::Fixed(Dimension::NONE);
@@ -215,7 +218,7 @@ impl Table<'_> {
 }
 
 /// Columns that come after the ones a user names.
-const RESERVED: [&str; 22] = [
+const RESERVED: [&str; 23] = [
     "seed",
     "status",
     "error_code",
@@ -230,6 +233,7 @@ const RESERVED: [&str; 22] = [
     "step",
     "duration",
     "steps",
+    "sub_steps",
     "particle_steps",
     "mass_defect",
     "version",

@@ -88,6 +88,8 @@ pub struct PointRow {
     pub step: f64,
     pub duration: f64,
     pub steps: u64,
+    /// Accepted sub-steps of integrators, all particles together; absent if nothing is integrated.
+    pub sub_steps: Option<u64>,
     /// Largest relative defect of any component.
     pub mass_defect: Option<f64>,
     /// Measures and errors of references (`limit.profile.AB.l2`), each a column.

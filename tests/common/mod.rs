@@ -145,6 +145,7 @@ pub fn point() -> PointRow {
         step: 2.0,
         duration: 20.0,
         steps: 10,
+        sub_steps: None,
         mass_defect: Some(1e-16),
         values: vec![
             value("err", "mol/m^3", Some(0.125)),

@@ -49,7 +49,7 @@ POINTS = {
     "status": (TEXT, ""), "error_code": (TEXT, ""), "error_message": (TEXT, ""),
     "wall": (REAL, "s"), "cpu": (REAL, "s"), "loop_wall": (REAL, "s"), "compile_wall": (REAL, "s"),
     "write_wall": (REAL, "s"), "peak_memory": ("uint64", "byte"), "particles": ("uint64", ""), "step": (REAL, "s"),
-    "duration": (REAL, "s"), "steps": ("uint64", ""), "particle_steps": ("uint64", ""), "mass_defect": (REAL, "1"),
+    "duration": (REAL, "s"), "steps": ("uint64", ""), "sub_steps": ("uint64", ""), "particle_steps": ("uint64", ""), "mass_defect": (REAL, "1"),
     "version": (TEXT, ""), "numerics": ("uint32", ""), "host": (TEXT, ""), "threads": ("uint32", ""),
     "started": ("timestamp[us]", "UTC"), "finished": ("timestamp[us]", "UTC"),
 }

@@ -82,9 +82,9 @@ fn a_cut_journal_loses_its_last_frame_only() {
     let again = folder.lamella(&["sweep", "s.lam", "--out", "cut"]).exits(0);
     again.says("of the journal are damaged").says("1 replicates run, 4 known");
     // A file that is no journal is left alone.
-    std::fs::write(&path, b"LmJ2 of another version").unwrap();
+    std::fs::write(&path, b"LmJ3 of another version").unwrap();
     folder.lamella(&["sweep", "s.lam", "--out", "cut"]).exits(1).says("no journal of this version");
-    assert_eq!(std::fs::read(&path).unwrap(), b"LmJ2 of another version");
+    assert_eq!(std::fs::read(&path).unwrap(), b"LmJ3 of another version");
 }
 
 #[test]
