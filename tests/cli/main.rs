@@ -7,4 +7,5 @@ mod overhead;
 mod program;
 mod runs;
 mod scenes;
+mod stress;
 mod used;
