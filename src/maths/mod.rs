@@ -11,4 +11,5 @@ pub mod quadrature;
 pub mod scalar;
 pub mod special;
 pub mod student;
+pub mod vector;
 pub mod wide;
