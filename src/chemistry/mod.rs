@@ -4,9 +4,16 @@
 //! and the plan. It deliberately knows no positions in memory, no zones and no bins: the engine hands it
 //! columns of carried values and gets them back reacted.
 
+mod closed;
 pub mod equilibrium;
+mod explicit;
+mod integrate;
+mod invariants;
+pub mod laws;
+mod matrix;
 mod observed;
 mod reactor;
+mod rosenbrock;
 
 pub use observed::Observed;
 pub use reactor::{Batch, Failure, Propagator, Reactor, Scratch, Why, Work};

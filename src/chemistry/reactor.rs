@@ -3,21 +3,66 @@
 //! Owns the choice of the integrator by the plan's method, and the recipes of species. May use all of
 //! `chemistry`. It deliberately stores nothing about particles: what must be remembered is lent.
 
-use crate::plan::chemistry::Kinetics;
+use super::closed::exponential::Exponential;
+use super::closed::pair::Pair;
+use super::closed::saturation::Saturation;
+use super::closed::zero::Zero;
+use super::explicit::Explicit;
+use super::integrate::{Lanes, Network, Task, integrate};
+use super::invariants::Invariants;
+use super::laws::{Basis, Linear, System};
+use super::matrix::Symbolic;
+use super::rosenbrock::{RODAS3, RODAS4, Rosenbrock};
+use crate::maths::wide::Width;
+use crate::plan::chemistry::{Chemistry, Equilibrium, Kinetics, Law, Method};
 use crate::plan::{Plan, Species};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+static NEXT_IDENTITY: AtomicU64 = AtomicU64::new(1);
 
 /// Compiled chemistry of a plan.
 #[derive(Debug, Clone)]
 pub struct Reactor {
     n_components: usize,
     species: Vec<Species>,
+    integrator: Integrator,
+    /// Speciation belongs here: `react` ends and `speciate` begins with it.
     #[allow(dead_code)]
-    kinetics: Option<Kinetics>,
+    equilibrium: Option<Equilibrium>,
+    width: Width,
+    /// Tells whose memory a [`Scratch`] is; copies share it.
+    identity: u64,
+}
+
+/// How the kinetics are taken over a step.
+#[derive(Debug, Clone)]
+enum Integrator {
+    Nothing,
+    Exponential(Exponential),
+    Pair(Pair),
+    Saturation(Saturation),
+    Zero(Zero),
+    /// With error control. `is_explicit`: tried first.
+    Adaptive {
+        network: Box<Network>,
+        symbolic: Symbolic,
+        is_explicit: bool,
+        is_third_order: bool,
+    },
 }
 
 /// What a thread needs besides, kept from call to call so that no step allocates.
 #[derive(Debug, Default)]
-pub struct Scratch {}
+pub struct Scratch {
+    /// The reactor that it was last used with; 0 for none.
+    owner: u64,
+    lanes: Lanes,
+    old: Vec<f64>,
+    /// The last propagator and its time.
+    propagator: Option<(f64, Propagator)>,
+    failures: Vec<Failure>,
+    left_over: Vec<u32>,
+}
 
 /// Particles that react together, as columns of equal length.
 #[derive(Debug)]
@@ -85,27 +130,112 @@ impl Reactor {
     /// `None` if the plan has no chemistry; an error if its chemistry cannot be compiled.
     pub fn new(plan: &Plan) -> Result<Option<Self>, String> {
         let Some(chemistry) = &plan.chemistry else { return Ok(None) };
+        let integrator = match &chemistry.kinetics {
+            None => Integrator::Nothing,
+            Some(_) if chemistry.equilibrium.is_some() => {
+                return Err("kinetics with equilibrium are not yet compiled".to_owned());
+            }
+            Some(kinetics) => Integrator::new(plan, chemistry, kinetics)?,
+        };
         Ok(Some(Self {
             n_components: plan.components.len(),
             species: plan.species.clone(),
-            kinetics: chemistry.kinetics.clone(),
+            integrator,
+            equilibrium: chemistry.equilibrium.clone(),
+            width: Width::widest(),
+            identity: NEXT_IDENTITY.fetch_add(1, Ordering::Relaxed),
         }))
     }
 
-    /// What a thread needs to call [`Reactor::react`].
-    pub fn scratch(&self) -> Scratch {
-        Scratch::default()
+    /// The same with other code, to compare: results have the same bits.
+    pub fn with_width(mut self, width: Width) -> Self {
+        self.width = width;
+        self
+    }
+
+    /// Makes a thread's memory that of this reactor.
+    fn adopt(&self, scratch: &mut Scratch) {
+        if scratch.owner == self.identity {
+            return;
+        }
+        let lanes = match &self.integrator {
+            Integrator::Adaptive { network, symbolic, .. } => Lanes::new(network, 7, symbolic.n_slots()),
+            _ => Lanes::default(),
+        };
+        *scratch = Scratch { owner: self.identity, lanes, ..Scratch::default() };
     }
 
     /// Takes every particle of the batch over its step. After a failure the columns are partly reacted.
-    pub fn react(&self, batch: Batch<'_>, _scratch: &mut Scratch) -> Result<Work, Failure> {
+    pub fn react(&self, batch: Batch<'_>, scratch: &mut Scratch) -> Result<Work, Failure> {
         debug_assert_eq!(batch.components.len(), self.n_components);
-        Ok(Work::default())
+        self.adopt(scratch);
+        let Batch { components, dt, .. } = batch;
+        match &self.integrator {
+            Integrator::Nothing => return Ok(Work::default()),
+            Integrator::Adaptive { .. } => {
+                return self.integrate(Batch { components, ..batch }, scratch);
+            }
+            Integrator::Exponential(network) => {
+                let known = scratch.propagator.take().filter(|(t, _)| t.to_bits() == dt.to_bits());
+                let (_, propagator) =
+                    scratch.propagator.insert(known.unwrap_or_else(|| (dt, network.propagator(dt))));
+                propagator.apply(self.width, components, &mut scratch.old);
+            }
+            Integrator::Pair(pair) => pair.react(self.width, dt, components),
+            Integrator::Saturation(law) => law.react(self.width, dt, components),
+            Integrator::Zero(law) => law.react(self.width, dt, components, &mut scratch.old),
+        }
+        check_finite(components)?;
+        let n = components.first().map_or(0, |column| column.len()) as u64;
+        Ok(Work { steps: n, rates: n, ..Work::default() })
+    }
+
+    fn integrate(&self, batch: Batch<'_>, scratch: &mut Scratch) -> Result<Work, Failure> {
+        let Integrator::Adaptive { network, symbolic, is_explicit, is_third_order } = &self.integrator else {
+            return Ok(Work::default());
+        };
+        let Scratch { lanes, failures, left_over, .. } = scratch;
+        failures.clear();
+        let mut task = Task {
+            positions: batch.positions,
+            t: batch.t,
+            dt: batch.dt,
+            components: batch.components,
+            memory: batch.memory,
+            chosen: None,
+            work: Work::default(),
+            failures,
+        };
+        if *is_explicit {
+            integrate(self.width, network, &Explicit { network }, lanes, &mut task);
+            if task.failures.is_empty() {
+                return Ok(task.work);
+            }
+            // Too stiff after all.
+            left_over.clear();
+            left_over.extend(task.failures.drain(..).map(|failure| failure.particle as u32));
+            left_over.sort_unstable();
+            task.chosen = Some(left_over);
+        }
+        if *is_third_order {
+            let stepper = Rosenbrock { network, symbolic, tableau: &RODAS3 };
+            integrate(self.width, network, &stepper, lanes, &mut task);
+        } else {
+            let stepper = Rosenbrock { network, symbolic, tableau: &RODAS4 };
+            integrate(self.width, network, &stepper, lanes, &mut task);
+        }
+        match task.failures.iter().min_by_key(|failure| failure.particle) {
+            Some(failure) => Err(*failure),
+            None => Ok(task.work),
+        }
     }
 
     /// The first-order network over a time, if the method of the plan is one: see [`Propagator`].
-    pub fn propagator(&self, _t: f64) -> Option<Propagator> {
-        None
+    pub fn propagator(&self, t: f64) -> Option<Propagator> {
+        match &self.integrator {
+            Integrator::Exponential(network) => Some(network.propagator(t)),
+            _ => None,
+        }
     }
 
     /// Concentrations of all species of the plan from what is carried.
@@ -125,4 +255,107 @@ impl Reactor {
         }
         Ok(())
     }
+}
+
+impl Integrator {
+    fn new(plan: &Plan, chemistry: &Chemistry, kinetics: &Kinetics) -> Result<Self, String> {
+        check_indices(plan, kinetics)?;
+        let n = plan.components.len();
+        let single = || match &kinetics.reactions[..] {
+            [reaction] => Ok(reaction),
+            reactions => Err(format!("a closed form for {} reactions", reactions.len())),
+        };
+        // Tolerances that are none would make every step fail.
+        let tolerance = chemistry.tolerance.clamp(1e-13, 1.0);
+        let small: Vec<f64> = (0..n)
+            .map(|component| tolerance * chemistry.floors.get(component).copied().unwrap_or(0.0).max(1e-250))
+            .collect();
+        let system = || System::new(kinetics, &plan.species, n, Basis::Components, &small);
+        Ok(match kinetics.method {
+            Method::Observed | Method::Exponential => {
+                let linear = match linear_of_mass_action(kinetics, &plan.species, n) {
+                    Some(linear) => Some(linear),
+                    None => system()?.linear,
+                };
+                let linear = linear.ok_or("the network is not of first order")?;
+                Self::Exponential(Exponential::new(n, linear.matrix, linear.constant))
+            }
+            Method::Pair => Self::Pair(Pair::new(single()?, &plan.species)?),
+            Method::Saturation => Self::Saturation(Saturation::new(single()?, &plan.species)?),
+            Method::Zero => Self::Zero(Zero::new(single()?)?),
+            Method::Explicit | Method::Rosenbrock => {
+                let system = system()?;
+                let changes: Vec<Vec<(usize, f64)>> =
+                    kinetics.reactions.iter().map(|reaction| reaction.changes.clone()).collect();
+                let symbolic = Symbolic::new(n, &system.pattern);
+                // What is faded out near zero is stiff there.
+                let is_explicit = kinetics.method == Method::Explicit && !system.is_gated;
+                let invariants = Invariants::new(n, &changes);
+                let network = Box::new(Network { system, invariants, small, tolerance });
+                Self::Adaptive { network, symbolic, is_explicit, is_third_order: tolerance >= 1e-5 }
+            }
+        })
+    }
+}
+
+fn check_indices(plan: &Plan, kinetics: &Kinetics) -> Result<(), String> {
+    let (n, n_species) = (plan.components.len(), plan.species.len());
+    let has_component = |&(component, _): &(usize, f64)| component < n;
+    let has_species = |law: &Law| match law {
+        Law::MassAction { orders, .. } => orders.iter().all(|&(species, _)| species < n_species),
+        Law::Saturation { species, .. } => *species < n_species,
+        Law::Expression => true,
+    };
+    for reaction in &kinetics.reactions {
+        if !reaction.changes.iter().all(has_component) || !has_species(&reaction.law) {
+            return Err(format!("reaction `{}` names what is not there", reaction.name));
+        }
+    }
+    if kinetics.laws.rates.len() != kinetics.reactions.len() {
+        return Err("one rate per reaction is needed".to_owned());
+    }
+    let tape = crate::plan::tape::Tape { operations: kinetics.laws.operations.clone() };
+    if !kinetics.reactions.is_empty() {
+        tape.check(4 + n_species)?;
+    }
+    let is_written = |register: &u16| usize::from(*register) < tape.operations.len();
+    if !kinetics.laws.rates.iter().all(is_written) {
+        return Err("a rate stands in no register".to_owned());
+    }
+    Ok(())
+}
+
+/// The matrix of a network whose laws are all mass action of order one or zero, from the laws themselves:
+/// what species are as sums of components may then be negative.
+fn linear_of_mass_action(kinetics: &Kinetics, species: &[Species], n: usize) -> Option<Linear> {
+    let (mut matrix, mut constant) = (vec![0.0; n * n], vec![0.0; n]);
+    for reaction in &kinetics.reactions {
+        let Law::MassAction { constant: rate, orders } = &reaction.law else { return None };
+        for &(row, coefficient) in &reaction.changes {
+            match orders[..] {
+                [] if coefficient * rate >= 0.0 => constant[row] += coefficient * rate,
+                [(index, 1.0)] => {
+                    let recipe = &species[index];
+                    constant[row] += coefficient * rate * recipe.constant;
+                    for &(column, factor) in &recipe.terms {
+                        matrix[row * n + column] += coefficient * rate * factor;
+                    }
+                }
+                _ => return None,
+            }
+        }
+    }
+    Some(Linear { matrix, constant })
+}
+
+fn check_finite(components: &[&mut [f64]]) -> Result<(), Failure> {
+    for (component, column) in components.iter().enumerate() {
+        // A sum of zeros, unless there is something that is no number.
+        let sum: f64 = column.iter().map(|value| value * 0.0).sum();
+        if sum != 0.0 {
+            let particle = column.iter().position(|value| !value.is_finite()).unwrap_or(0);
+            return Err(Failure { particle, why: Why::NotFinite { component } });
+        }
+    }
+    Ok(())
 }

@@ -25,7 +25,7 @@ pub enum Unary {
 }
 
 impl Unary {
-    #[inline]
+    #[inline(always)]
     pub fn apply(self, a: f64) -> f64 {
         match self {
             Unary::Negate => -a,
@@ -66,7 +66,7 @@ pub enum Binary {
 }
 
 impl Binary {
-    #[inline]
+    #[inline(always)]
     pub fn apply(self, a: f64, b: f64) -> f64 {
         match self {
             Binary::Add => a + b,
@@ -91,6 +91,7 @@ impl Binary {
     }
 }
 
+#[inline(always)]
 fn truth(value: bool) -> f64 {
     f64::from(u8::from(value))
 }

@@ -1,0 +1,339 @@
+//! Steps with error control, each particle at its own pace, many particles at once.
+//!
+//! Owns which particle stands in which lane, the size of its steps, the tests of error, sign and
+//! finiteness, and what remains after rounding. May use the laws and `maths`. It deliberately knows no
+//! method: a method makes one step of all lanes.
+
+use super::invariants::Invariants;
+use super::laws::{LANES, Lane, System};
+use super::reactor::{Failure, Why, Work};
+use crate::maths::vector;
+use crate::maths::wide::Width;
+use pulp::NullaryFnOnce;
+
+/// The local error is held to this share of the tolerance, so that errors that add up or grow stay within
+/// ten tolerances.
+const LOCAL_SHARE: f64 = 0.1;
+
+/// A lane without a particle.
+const IDLE: u32 = u32::MAX;
+
+/// One step of all lanes.
+pub(super) trait Stepper {
+    /// Sub-steps after which a particle is given up.
+    const MOST_STEPS: u32;
+    /// Order of the error estimate plus 1.
+    fn exponent(&self) -> f64;
+    /// Evaluations of rates and factored matrices per attempt.
+    fn work(&self) -> (u64, u64);
+    /// Whatever depends on the state alone; leaves `dy/dt` in `slopes`.
+    fn begin(&self, lanes: &mut Lanes);
+    /// From `y` over `step` to `new` with the estimate `error`.
+    fn attempt(&self, lanes: &mut Lanes);
+}
+
+/// What both methods need to know of the network.
+#[derive(Debug, Clone)]
+pub(super) struct Network {
+    pub system: System,
+    pub invariants: Invariants,
+    /// Per component: tolerance × floor.
+    pub small: Vec<f64>,
+    pub tolerance: f64,
+}
+
+/// The state of all lanes, and what the methods remember within a step.
+#[derive(Debug, Default, Clone)]
+pub(super) struct Lanes {
+    pub y: Vec<Lane>,
+    pub new: Vec<Lane>,
+    pub error: Vec<Lane>,
+    pub slopes: Vec<Lane>,
+    pub sum: Vec<Lane>,
+    pub stages: Vec<Lane>,
+    pub matrix: Vec<Lane>,
+    /// Registers of the programs.
+    pub rates: Vec<Lane>,
+    pub full: Vec<Lane>,
+    pub positions: [Lane; 3],
+    pub elapsed: Lane,
+    /// The size that is tried now.
+    pub step: Lane,
+    pub t: f64,
+    /// The size that the error asks for.
+    wanted: Lane,
+    totals: Vec<Lane>,
+    particle: [u32; LANES],
+    count: [u32; LANES],
+    is_fresh: [bool; LANES],
+    was_rejected: [bool; LANES],
+    column: Vec<f64>,
+    column_totals: Vec<f64>,
+    dense: Vec<f64>,
+}
+
+impl Lanes {
+    pub fn new(network: &Network, n_stages: usize, n_slots: usize) -> Self {
+        let n = network.system.n_components;
+        let zeros = |n: usize| vec![[0.0; LANES]; n];
+        Self {
+            y: zeros(n),
+            new: zeros(n),
+            error: zeros(n),
+            slopes: zeros(n),
+            sum: zeros(n),
+            stages: zeros(n * n_stages),
+            matrix: zeros(n_slots),
+            rates: network.system.rates.registers(),
+            full: network.system.full.registers(),
+            totals: zeros(network.invariants.count()),
+            column: vec![0.0; n],
+            column_totals: vec![0.0; network.invariants.count()],
+            ..Self::default()
+        }
+    }
+}
+
+/// Which particles go where, and what came of it.
+pub(super) struct Task<'a, 'b> {
+    pub positions: [&'a [f64]; 3],
+    pub t: f64,
+    pub dt: f64,
+    pub components: &'a mut [&'b mut [f64]],
+    pub memory: &'a mut [f32],
+    /// Particles to do; `None`: all.
+    pub chosen: Option<&'a [u32]>,
+    pub work: Work,
+    /// Particles that cannot be done, as they were, with the reason.
+    pub failures: &'a mut Vec<Failure>,
+}
+
+/// Takes all chosen particles over the step.
+pub(super) fn integrate<S: Stepper>(
+    width: Width,
+    network: &Network,
+    stepper: &S,
+    lanes: &mut Lanes,
+    task: &mut Task<'_, '_>,
+) {
+    width.run(Run { network, stepper, lanes, task });
+}
+
+struct Run<'a, 't, 'u, 'v, S> {
+    network: &'a Network,
+    stepper: &'a S,
+    lanes: &'a mut Lanes,
+    task: &'t mut Task<'u, 'v>,
+}
+
+impl<S: Stepper> NullaryFnOnce for Run<'_, '_, '_, '_, S> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { network, stepper, lanes, task } = self;
+        let n_chosen =
+            task.chosen.map_or_else(|| task.components.first().map_or(0, |c| c.len()), <[u32]>::len);
+        let mut next = 0;
+        lanes.t = task.t;
+        lanes.particle = [IDLE; LANES];
+        lanes.step = [task.dt; LANES];
+        let (n_rates, n_factored) = stepper.work();
+        loop {
+            let mut n_busy = 0;
+            for l in 0..LANES {
+                if lanes.particle[l] == IDLE && next < n_chosen {
+                    let particle = task.chosen.map_or(next as u32, |chosen| chosen[next]);
+                    load(network, lanes, task, l, particle);
+                    next += 1;
+                }
+                n_busy += u64::from(lanes.particle[l] != IDLE);
+            }
+            if n_busy == 0 {
+                return;
+            }
+            task.work.rates += n_busy * n_rates;
+            task.work.factored += n_busy * n_factored;
+            stepper.begin(lanes);
+            choose_steps(network, lanes, task.dt);
+            stepper.attempt(lanes);
+            let judged = judge(network, lanes, stepper.exponent());
+            for l in 0..LANES {
+                if lanes.particle[l] != IDLE {
+                    conclude::<S>(network, lanes, task, l, &judged);
+                }
+            }
+        }
+    }
+}
+
+/// Puts a particle into a lane.
+fn load(network: &Network, lanes: &mut Lanes, task: &Task<'_, '_>, l: usize, particle: u32) {
+    let at = particle as usize;
+    for (component, value) in lanes.column.iter_mut().enumerate() {
+        let carried = task.components[component][at];
+        let is_below = network.system.is_positive[component] && carried < 0.0;
+        *value = if is_below { 0.0 } else { carried };
+        lanes.y[component][l] = *value;
+    }
+    network.invariants.totals(&lanes.column, &mut lanes.column_totals);
+    for (total, value) in lanes.totals.iter_mut().zip(&lanes.column_totals) {
+        total[l] = *value;
+    }
+    for (lane, column) in lanes.positions.iter_mut().zip(task.positions) {
+        lane[l] = column.get(at).copied().unwrap_or(0.0);
+    }
+    let remembered = task.memory.get(at).copied().unwrap_or(0.0);
+    lanes.wanted[l] = if remembered > 0.0 { f64::from(remembered) } else { 0.0 };
+    lanes.elapsed[l] = 0.0;
+    lanes.particle[l] = particle;
+    lanes.count[l] = 0;
+    lanes.is_fresh[l] = lanes.wanted[l] == 0.0;
+    lanes.was_rejected[l] = false;
+}
+
+/// First steps from the size of values and slopes, and no step beyond the end.
+#[inline(always)]
+fn choose_steps(network: &Network, lanes: &mut Lanes, dt: f64) {
+    if lanes.is_fresh.contains(&true) {
+        let n = network.system.n_components;
+        let (mut values, mut slopes) = ([0.0; LANES], [0.0; LANES]);
+        for i in 0..n {
+            for l in 0..LANES {
+                let scale = 1.0 / (network.small[i] + network.tolerance * lanes.y[i][l].abs());
+                let (value, slope) = (lanes.y[i][l] * scale, lanes.slopes[i][l] * scale);
+                values[l] += value * value;
+                slopes[l] += slope * slope;
+            }
+        }
+        for l in 0..LANES {
+            if lanes.is_fresh[l] {
+                let (value, slope) = (values[l].sqrt(), slopes[l].sqrt());
+                let guess = 0.01 * if value > 1.0 { value } else { 1.0 } / slope;
+                lanes.wanted[l] = if guess < dt { guess } else { dt };
+                lanes.is_fresh[l] = false;
+            }
+        }
+    }
+    for l in 0..LANES {
+        let (left, wanted) = (dt - lanes.elapsed[l], lanes.wanted[l]);
+        // Two equal steps rather than a whole one and a crumb.
+        let half = if wanted < 0.5 * left { wanted } else { 0.5 * left };
+        let step = if wanted >= left * (1.0 - 1e-10) { left } else { half };
+        lanes.step[l] = if lanes.particle[l] == IDLE { dt } else { step };
+    }
+}
+
+/// What came of a step, per lane.
+struct Judged {
+    /// The error in tolerances; NaN if something was not finite.
+    norm: Lane,
+    factor: Lane,
+    /// True as 1: no value is below nothing.
+    is_positive: Lane,
+}
+
+#[inline(always)]
+fn judge(network: &Network, lanes: &mut Lanes, exponent: f64) -> Judged {
+    let n = network.system.n_components;
+    let (mut sum, mut is_positive) = ([0.0; LANES], [1.0; LANES]);
+    for i in 0..n {
+        let small = network.small[i];
+        let lowest = if network.system.is_positive[i] { -small } else { f64::NEG_INFINITY };
+        for l in 0..LANES {
+            let (old, new) = (lanes.y[i][l].abs(), lanes.new[i][l].abs());
+            let larger = if old > new { old } else { new };
+            // Not `max`: NaN must come through.
+            let share = lanes.error[i][l] / (LOCAL_SHARE * (small + network.tolerance * larger));
+            let broken = lanes.new[i][l] * 0.0;
+            sum[l] += share * share + broken;
+            is_positive[l] = if lanes.new[i][l] < lowest { 0.0 } else { is_positive[l] };
+        }
+    }
+    let (mut norm, mut factor) = ([0.0; LANES], [0.0; LANES]);
+    for l in 0..LANES {
+        norm[l] = (sum[l] / n as f64).sqrt();
+        let ideal = 0.9 * vector::pow(norm[l], -1.0 / exponent);
+        let low = if ideal < 0.2 { 0.2 } else { ideal };
+        factor[l] = if low > 5.0 { 5.0 } else { low };
+    }
+    Judged { norm, factor, is_positive }
+}
+
+/// Accepts or rejects the step of one lane, and lets its particle go when it is done or lost.
+#[inline(always)]
+fn conclude<S: Stepper>(
+    network: &Network,
+    lanes: &mut Lanes,
+    task: &mut Task<'_, '_>,
+    l: usize,
+    judged: &Judged,
+) {
+    let step = lanes.step[l];
+    let is_right = judged.norm[l] <= 1.0 && judged.is_positive[l] == 1.0;
+    lanes.count[l] += 1;
+    if !is_right {
+        task.work.rejected += 1;
+        // Not finite: far away. Negative: half. Otherwise the error says how much.
+        let shrink = if judged.norm[l] > 1.0 { judged.factor[l].min(0.9) } else { 0.5 };
+        lanes.wanted[l] = step * if judged.norm[l].is_nan() { 0.1 } else { shrink };
+        lanes.was_rejected[l] = true;
+        let is_lost = lanes.count[l] >= S::MOST_STEPS
+            || lanes.elapsed[l] + lanes.wanted[l] == lanes.elapsed[l]
+            || lanes.wanted[l].partial_cmp(&(1e-40 * task.dt)) != Some(std::cmp::Ordering::Greater);
+        if is_lost {
+            lose(lanes, task, l, step);
+        }
+        return;
+    }
+    task.work.steps += 1;
+    for (i, is_positive) in network.system.is_positive.iter().enumerate() {
+        let new = lanes.new[i][l];
+        // Numbers this small only cost time.
+        let is_none = (*is_positive && new < 0.0) || new.abs() < 1e-250;
+        lanes.y[i][l] = if is_none { 0.0 } else { new };
+    }
+    let most = if lanes.was_rejected[l] { 1.0 } else { 5.0 };
+    let asked = step * judged.factor[l].min(most);
+    // A step that was cut short at the end says little.
+    lanes.wanted[l] = if step < lanes.wanted[l] { asked.max(lanes.wanted[l]) } else { asked };
+    lanes.was_rejected[l] = false;
+    let is_last = step == task.dt - lanes.elapsed[l];
+    lanes.elapsed[l] += step;
+    if is_last {
+        finish(network, lanes, task, l);
+    } else if lanes.count[l] >= S::MOST_STEPS {
+        lose(lanes, task, l, step);
+    }
+}
+
+/// Writes a particle back.
+fn finish(network: &Network, lanes: &mut Lanes, task: &mut Task<'_, '_>, l: usize) {
+    let at = lanes.particle[l] as usize;
+    for (value, lane) in lanes.column.iter_mut().zip(&lanes.y) {
+        *value = lane[l];
+    }
+    for (value, lane) in lanes.column_totals.iter_mut().zip(&lanes.totals) {
+        *value = lane[l];
+    }
+    network.invariants.restore(&mut lanes.column, &lanes.column_totals, &mut lanes.dense);
+    for (column, value) in task.components.iter_mut().zip(&lanes.column) {
+        column[at] = *value;
+    }
+    if let Some(remembered) = task.memory.get_mut(at) {
+        *remembered = lanes.wanted[l].min(f64::from(f32::MAX)) as f32;
+    }
+    lanes.particle[l] = IDLE;
+}
+
+/// Gives a particle up, as it was before the whole step.
+fn lose(lanes: &mut Lanes, task: &mut Task<'_, '_>, l: usize, step: f64) {
+    let particle = lanes.particle[l] as usize;
+    let broken = lanes.slopes.iter().position(|slope| !slope[l].is_finite());
+    let why = match broken {
+        Some(component) => Why::NotFinite { component },
+        None => Why::StepTooSmall { t: task.t + lanes.elapsed[l], step },
+    };
+    task.failures.push(Failure { particle, why });
+    lanes.particle[l] = IDLE;
+}
