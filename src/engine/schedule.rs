@@ -6,7 +6,8 @@ use super::error::RunError;
 use super::program::unsound;
 use crate::plan::{Plan, Time};
 
-/// A time is on the grid of steps if it is this near, in steps.
+/// A time is on the grid of steps if it is this near, in steps. The beginning is 0 and nothing else: there
+/// may be much to see in the first part of a long step.
 const ON_GRID: f64 = 1e-9;
 
 /// A time at which outputs are due.
@@ -67,7 +68,8 @@ fn locate(time: &Time, t: f64) -> Option<(u64, f64)> {
     let near = ((t / time.step).round() as u64).min(time.n_steps);
     let at = |steps: u64| if steps == time.n_steps { time.duration } else { steps as f64 * time.step };
     for steps in [near, (near + 1).min(time.n_steps), time.n_steps] {
-        if (t - at(steps)).abs() <= ON_GRID * time.step {
+        let slack = if steps == 0 { 0.0 } else { ON_GRID * time.step };
+        if (t - at(steps)).abs() <= slack {
             return Some((steps, 0.0));
         }
     }
@@ -92,6 +94,10 @@ mod tests {
         let (steps, fraction) = locate(&time, 0.715).unwrap();
         assert_eq!(steps, 7);
         assert!((fraction - 0.5).abs() < 1e-12);
+        assert_eq!(locate(&time, 0.0), Some((0, 0.0)));
+        let (steps, fraction) = locate(&time, 1e-12).unwrap();
+        assert_eq!(steps, 0);
+        assert!((fraction - 1e-11).abs() < 1e-20);
         assert_eq!(locate(&time, 0.74), None);
         assert_eq!(locate(&time, f64::NAN), None);
         assert!((step_length(&time, 7) - 0.03).abs() < 1e-12);
