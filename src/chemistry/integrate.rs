@@ -4,6 +4,7 @@
 //! finiteness, and what remains after rounding. May use the laws and `maths`. It deliberately knows no
 //! method: a method makes one step of all lanes.
 
+use super::aqueous::AqueousLanes;
 use super::invariants::Invariants;
 use super::laws::{LANES, Lane, System};
 use super::reactor::{Failure, Why, Work};
@@ -57,6 +58,8 @@ pub(super) struct Lanes {
     pub full: Vec<Lane>,
     pub positions: [Lane; 3],
     pub elapsed: Lane,
+    /// What speciation needs, where species are in equilibrium.
+    pub aqueous: Option<Box<AqueousLanes>>,
     /// The size that is tried now.
     pub step: Lane,
     pub t: f64,

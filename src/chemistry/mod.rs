@@ -4,6 +4,7 @@
 //! and the plan. It deliberately knows no positions in memory, no zones and no bins: the engine hands it
 //! columns of carried values and gets them back reacted.
 
+mod aqueous;
 mod closed;
 pub mod equilibrium;
 mod explicit;

@@ -3,6 +3,7 @@
 //! Owns the choice of the integrator by the plan's method, and the recipes of species. May use all of
 //! `chemistry`. It deliberately stores nothing about particles: what must be remembered is lent.
 
+use super::aqueous::{Aqueous, AqueousScratch};
 use super::closed::exponential::Exponential;
 use super::closed::pair::Pair;
 use super::closed::saturation::Saturation;
@@ -14,7 +15,7 @@ use super::laws::{Basis, Linear, System};
 use super::matrix::Symbolic;
 use super::rosenbrock::{RODAS3, RODAS4, Rosenbrock};
 use crate::maths::wide::Width;
-use crate::plan::chemistry::{Chemistry, Equilibrium, Kinetics, Law, Method};
+use crate::plan::chemistry::{Chemistry, Kinetics, Law, Method};
 use crate::plan::{Plan, Species};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -26,9 +27,7 @@ pub struct Reactor {
     n_components: usize,
     species: Vec<Species>,
     integrator: Integrator,
-    /// Speciation belongs here: `react` ends and `speciate` begins with it.
-    #[allow(dead_code)]
-    equilibrium: Option<Equilibrium>,
+    aqueous: Option<Box<Aqueous>>,
     width: Width,
     /// Tells whose memory a [`Scratch`] is; copies share it.
     identity: u64,
@@ -57,6 +56,7 @@ pub struct Scratch {
     /// The reactor that it was last used with; 0 for none.
     owner: u64,
     lanes: Lanes,
+    aqueous: Option<AqueousScratch>,
     old: Vec<f64>,
     /// The last propagator and its time.
     propagator: Option<(f64, Propagator)>,
@@ -112,8 +112,13 @@ pub enum Why {
         component: usize,
         value: f64,
     },
+    /// Totals have no equilibrium (residual 1), or it is not found to the last digits.
     NoEquilibrium {
         residual: f64,
+    },
+    /// More ions than the model of activities is for, mol/L.
+    TooSalty {
+        ionic_strength: f64,
     },
 }
 
@@ -130,18 +135,17 @@ impl Reactor {
     /// `None` if the plan has no chemistry; an error if its chemistry cannot be compiled.
     pub fn new(plan: &Plan) -> Result<Option<Self>, String> {
         let Some(chemistry) = &plan.chemistry else { return Ok(None) };
+        let aqueous = chemistry.equilibrium.as_ref().map(|equilibrium| Aqueous::new(plan, equilibrium));
+        let aqueous = aqueous.transpose()?.map(Box::new);
         let integrator = match &chemistry.kinetics {
             None => Integrator::Nothing,
-            Some(_) if chemistry.equilibrium.is_some() => {
-                return Err("kinetics with equilibrium are not yet compiled".to_owned());
-            }
-            Some(kinetics) => Integrator::new(plan, chemistry, kinetics)?,
+            Some(kinetics) => Integrator::new(plan, chemistry, kinetics, aqueous.as_deref())?,
         };
         Ok(Some(Self {
             n_components: plan.components.len(),
             species: plan.species.clone(),
             integrator,
-            equilibrium: chemistry.equilibrium.clone(),
+            aqueous,
             width: Width::widest(),
             identity: NEXT_IDENTITY.fetch_add(1, Ordering::Relaxed),
         }))
@@ -162,7 +166,11 @@ impl Reactor {
             Integrator::Adaptive { network, symbolic, .. } => Lanes::new(network, 7, symbolic.n_slots()),
             _ => Lanes::default(),
         };
-        *scratch = Scratch { owner: self.identity, lanes, ..Scratch::default() };
+        let aqueous = self.aqueous.as_ref().map(|aqueous| aqueous.scratch());
+        *scratch = Scratch { owner: self.identity, lanes, aqueous, ..Scratch::default() };
+        if let (Some(aqueous), Integrator::Adaptive { .. }) = (&self.aqueous, &self.integrator) {
+            scratch.lanes.aqueous = Some(Box::new(aqueous.lanes()));
+        }
     }
 
     /// Takes every particle of the batch over its step. After a failure the columns are partly reacted.
@@ -195,6 +203,7 @@ impl Reactor {
             return Ok(Work::default());
         };
         let Scratch { lanes, failures, left_over, .. } = scratch;
+        let aqueous = self.aqueous.as_deref().map(|aqueous| (aqueous, self.width));
         failures.clear();
         let mut task = Task {
             positions: batch.positions,
@@ -218,10 +227,10 @@ impl Reactor {
             task.chosen = Some(left_over);
         }
         if *is_third_order {
-            let stepper = Rosenbrock { network, symbolic, tableau: &RODAS3 };
+            let stepper = Rosenbrock { network, symbolic, tableau: &RODAS3, aqueous };
             integrate(self.width, network, &stepper, lanes, &mut task);
         } else {
-            let stepper = Rosenbrock { network, symbolic, tableau: &RODAS4 };
+            let stepper = Rosenbrock { network, symbolic, tableau: &RODAS4, aqueous };
             integrate(self.width, network, &stepper, lanes, &mut task);
         }
         match task.failures.iter().min_by_key(|failure| failure.particle) {
@@ -243,8 +252,12 @@ impl Reactor {
         &self,
         components: &[&[f64]],
         species: &mut [&mut [f64]],
-        _scratch: &mut Scratch,
+        scratch: &mut Scratch,
     ) -> Result<(), Failure> {
+        self.adopt(scratch);
+        if let (Some(aqueous), Some(scratch)) = (&self.aqueous, &mut scratch.aqueous) {
+            return aqueous.speciate(self.width, components, species, scratch);
+        }
         for (recipe, column) in self.species.iter().zip(species) {
             column.fill(recipe.constant);
             for &(component, coefficient) in &recipe.terms {
@@ -258,7 +271,12 @@ impl Reactor {
 }
 
 impl Integrator {
-    fn new(plan: &Plan, chemistry: &Chemistry, kinetics: &Kinetics) -> Result<Self, String> {
+    fn new(
+        plan: &Plan,
+        chemistry: &Chemistry,
+        kinetics: &Kinetics,
+        aqueous: Option<&Aqueous>,
+    ) -> Result<Self, String> {
         check_indices(plan, kinetics)?;
         let n = plan.components.len();
         let single = || match &kinetics.reactions[..] {
@@ -270,6 +288,9 @@ impl Integrator {
         let small: Vec<f64> = (0..n)
             .map(|component| tolerance * chemistry.floors.get(component).copied().unwrap_or(0.0).max(1e-250))
             .collect();
+        if let Some(aqueous) = aqueous {
+            return Self::mixed(plan, (tolerance, small), kinetics, aqueous);
+        }
         let system = || System::new(kinetics, &plan.species, n, Basis::Components, &small);
         Ok(match kinetics.method {
             Method::Observed | Method::Exponential => {
@@ -295,6 +316,27 @@ impl Integrator {
                 Self::Adaptive { network, symbolic, is_explicit, is_third_order: tolerance >= 1e-5 }
             }
         })
+    }
+}
+
+impl Integrator {
+    /// Kinetics of species in equilibrium: totals are integrated, with the rates of what they speciate to.
+    fn mixed(
+        plan: &Plan,
+        (tolerance, small): (f64, Vec<f64>),
+        kinetics: &Kinetics,
+        aqueous: &Aqueous,
+    ) -> Result<Self, String> {
+        let n = plan.components.len();
+        let mut system = System::new(kinetics, &plan.species, n, Basis::Species, &small)?;
+        aqueous.mark_signs(&mut system.is_positive);
+        let changes: Vec<Vec<(usize, f64)>> =
+            kinetics.reactions.iter().map(|reaction| reaction.changes.clone()).collect();
+        let everywhere: Vec<(usize, usize)> = (0..n).flat_map(|i| (0..n).map(move |j| (i, j))).collect();
+        let symbolic = Symbolic::new(n, &everywhere);
+        let invariants = Invariants::new(n, &changes);
+        let network = Box::new(Network { system, invariants, small, tolerance });
+        Ok(Self::Adaptive { network, symbolic, is_explicit: false, is_third_order: tolerance >= 1e-5 })
     }
 }
 

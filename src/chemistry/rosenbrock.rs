@@ -3,9 +3,11 @@
 //! Owns the coefficients and one step over lanes. May use the laws, sparse matrices and the driver of
 //! steps. It deliberately controls no step size.
 
+use super::aqueous::Aqueous;
 use super::integrate::{Lanes, Network, Stepper};
 use super::laws::{LANES, Lane};
 use super::matrix::Symbolic;
+use crate::maths::wide::Width;
 
 /// Coefficients of
 /// `(I/(hγ) − J) K_i = f(t + α_i h, Y_i) + Σ_{j<i} (c_ij/h) K_j + γ_i h ∂f/∂t`,
@@ -93,6 +95,8 @@ pub(super) struct Rosenbrock<'a, const S: usize> {
     pub network: &'a Network,
     pub symbolic: &'a Symbolic,
     pub tableau: &'static Tableau<S>,
+    /// Rates are those of species in equilibrium.
+    pub aqueous: Option<(&'a Aqueous, Width)>,
 }
 
 impl<const S: usize> Stepper for Rosenbrock<'_, S> {
@@ -109,8 +113,14 @@ impl<const S: usize> Stepper for Rosenbrock<'_, S> {
     #[inline(always)]
     fn begin(&self, lanes: &mut Lanes) {
         let system = &self.network.system;
-        let Lanes { y, full, slopes, positions, elapsed, t, .. } = lanes;
-        load(&system.is_positive, y, full);
+        let Lanes { y, full, slopes, positions, elapsed, t, aqueous, .. } = lanes;
+        match (self.aqueous, aqueous) {
+            (Some((model, width)), Some(own)) => {
+                own.forget(elapsed);
+                model.fill(width, y, full, own);
+            }
+            _ => load(&system.is_positive, y, full),
+        }
         let n = system.n_variables;
         full[n..n + 3].copy_from_slice(positions);
         for l in 0..LANES {
@@ -134,7 +144,13 @@ impl<const S: usize> Stepper for Rosenbrock<'_, S> {
             diagonal[l] = inverse[l] / self.tableau.gamma;
         }
         let places = &system.full.outputs[n..n + system.pattern.len()];
-        self.symbolic.fill(&diagonal, &lanes.full, places, &mut lanes.matrix);
+        match (self.aqueous, &mut lanes.aqueous) {
+            (Some((model, width)), Some(own)) => {
+                model.jacobian(width, &system.pattern, (&lanes.full, places), own);
+                self.symbolic.fill(&diagonal, &own.jacobian, &own.places, &mut lanes.matrix);
+            }
+            _ => self.symbolic.fill(&diagonal, &lanes.full, places, &mut lanes.matrix),
+        }
         self.symbolic.factor(&mut lanes.matrix);
         for stage in 0..S {
             if self.tableau.is_new[stage] {
@@ -155,9 +171,12 @@ impl<const S: usize> Rosenbrock<'_, S> {
     #[inline(always)]
     fn evaluate(&self, lanes: &mut Lanes, stage: usize) {
         let system = &self.network.system;
-        let Lanes { y, stages, sum, rates, slopes, elapsed, step, t, .. } = lanes;
+        let Lanes { y, stages, sum, rates, slopes, elapsed, step, t, aqueous, .. } = lanes;
         combine(system.n_components, &self.tableau.a[stage], Some(y), stages, sum);
-        load(&system.is_positive, sum, rates);
+        match (self.aqueous, aqueous) {
+            (Some((model, width)), Some(own)) => model.fill(width, sum, rates, own),
+            _ => load(&system.is_positive, sum, rates),
+        }
         for l in 0..LANES {
             rates[system.n_variables + 3][l] = *t + (elapsed[l] + self.tableau.alpha[stage] * step[l]);
         }

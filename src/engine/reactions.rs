@@ -218,6 +218,12 @@ impl Reactions {
             Why::NoEquilibrium { residual } => {
                 format!("no equilibrium is found (relative residual {})", precise(residual))
             }
+            Why::TooSalty { ionic_strength } => {
+                format!(
+                    "the ionic strength {} mol/L is more than activities are known for",
+                    precise(ionic_strength)
+                )
+            }
         }
     }
 }

@@ -13,7 +13,8 @@ const EXPLICIT: f64 = 5.0;
 
 pub(super) fn choose(plan: &mut Plan, scales: Option<&TimeScales>) {
     let step = plan.time.step;
-    let Some(chemistry) = plan.chemistry.as_mut().filter(|chemistry| chemistry.integrator == Integrator::Auto)
+    let Some(chemistry) =
+        plan.chemistry.as_mut().filter(|chemistry| chemistry.integrator == Integrator::Auto)
     else {
         return;
     };

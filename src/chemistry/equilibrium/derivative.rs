@@ -14,21 +14,21 @@ use pulp::NullaryFnOnce;
 const LN_OF_LITTLE: [f64; 5] = [0.0, -400.0, -200.0, -100.0, -50.0];
 
 /// One call of [`super::Speciation::derivatives`].
-pub(super) struct Derivatives<'a, 'b, 'c> {
+pub(super) struct Derivatives<'a, 'c, C, D, M> {
     pub system: &'c System,
-    pub totals: &'a [&'b [f64]],
-    pub concentrations: &'a [&'b [f64]],
-    pub out: &'a mut [&'b mut [f64]],
+    pub totals: &'a [C],
+    pub concentrations: &'a [D],
+    pub out: &'a mut [M],
     pub newton: &'c mut Newton<LANES>,
     pub stages: &'c mut [u8],
 }
 
-impl NullaryFnOnce for Derivatives<'_, '_, '_> {
+impl<C: AsRef<[f64]>, D: AsRef<[f64]>, M: AsMut<[f64]>> NullaryFnOnce for Derivatives<'_, '_, C, D, M> {
     type Output = ();
 
     #[inline(always)]
     fn call(mut self) {
-        let n_particles = self.totals.first().map_or(0, |column| column.len());
+        let n_particles = self.totals.first().map_or(0, |column| column.as_ref().len());
         let mut first = 0;
         while first < n_particles {
             let n_lanes = (n_particles - first).min(LANES);
@@ -49,7 +49,7 @@ impl NullaryFnOnce for Derivatives<'_, '_, '_> {
     }
 }
 
-impl Derivatives<'_, '_, '_> {
+impl<C: AsRef<[f64]>, D: AsRef<[f64]>, M: AsMut<[f64]>> Derivatives<'_, '_, C, D, M> {
     #[inline(always)]
     fn load(&mut self, first: usize, n_lanes: usize) {
         let point = &mut self.newton.point;
@@ -57,23 +57,23 @@ impl Derivatives<'_, '_, '_> {
         for lane in 0..LANES {
             let idx = first + lane.min(n_lanes - 1);
             self.stages.fill(0);
-            if self.totals.iter().any(|column| column[idx] == 0.0) {
-                self.system.absent(|j| self.totals[j][idx], self.stages);
+            if self.totals.iter().any(|column| column.as_ref()[idx] == 0.0) {
+                self.system.absent(|j| self.totals[j].as_ref()[idx], self.stages);
             }
             for (j, stage) in self.stages.iter().enumerate() {
-                let known = self.concentrations[j][idx];
+                let known = self.concentrations[j].as_ref()[idx];
                 let ln = ln_of(if known > 0.0 { known } else { 1.0 });
                 let little = LN_OF_LITTLE[*stage as usize];
                 point.xi[j][lane] = if known > 0.0 { ln } else { little };
-                point.total[j][lane] = self.totals[j][idx];
+                point.total[j][lane] = self.totals[j].as_ref()[idx];
             }
             let mut ionic = MIN_IONIC_STRENGTH;
             for (weight, column) in self.system.ionic.iter().zip(self.concentrations) {
-                ionic += weight * column[idx];
+                ionic += weight * column.as_ref()[idx];
             }
             point.ionic[lane] = ionic;
             for (k, amount) in point.amount.iter_mut().enumerate() {
-                amount[lane] = self.concentrations[n + self.system.n_secondaries + k][idx];
+                amount[lane] = self.concentrations[n + self.system.n_secondaries + k].as_ref()[idx];
             }
         }
     }
@@ -127,7 +127,7 @@ impl Derivatives<'_, '_, '_> {
                     change[lane] *= point.values[s][lane];
                 }
             }
-            self.out[s * n + j][first..first + n_lanes].copy_from_slice(&change[..n_lanes]);
+            self.out[s * n + j].as_mut()[first..first + n_lanes].copy_from_slice(&change[..n_lanes]);
         }
     }
 }

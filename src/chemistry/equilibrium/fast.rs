@@ -12,13 +12,13 @@ use crate::maths::scalar;
 use pulp::NullaryFnOnce;
 
 /// One call of [`Speciation::solve`].
-pub(super) struct Fast<'a, 'b, 'c> {
+pub(super) struct Fast<'a, 'c, C, M> {
     pub speciation: &'c Speciation,
-    pub columns: Totals<'a, 'b>,
+    pub columns: Totals<'a, C, M>,
     pub workspace: &'c mut Workspace,
 }
 
-impl NullaryFnOnce for Fast<'_, '_, '_> {
+impl<C: AsRef<[f64]>, M: AsRef<[f64]> + AsMut<[f64]>> NullaryFnOnce for Fast<'_, '_, C, M> {
     type Output = Result<Effort, Refused>;
 
     #[inline(always)]
@@ -58,23 +58,23 @@ impl NullaryFnOnce for Fast<'_, '_, '_> {
     }
 }
 
-struct Batch<'a, 'b, 'c, 'd> {
+struct Batch<'a, 'c, 'd, C, M> {
     system: &'d System,
-    columns: &'c mut Totals<'a, 'b>,
+    columns: &'c mut Totals<'a, C, M>,
     stages: &'d mut [u8],
     next: usize,
     refused: Option<Refused>,
 }
 
-impl Batch<'_, '_, '_, '_> {
+impl<C: AsRef<[f64]>, M: AsRef<[f64]> + AsMut<[f64]>> Batch<'_, '_, '_, C, M> {
     /// Fills a lane with the next particle that has totals.
     #[inline(always)]
     fn load(&mut self, newton: &mut Newton<LANES>, lane: usize) -> Option<usize> {
-        let n_particles = self.columns.totals.first().map_or(0, |column| column.len());
+        let n_particles = self.columns.totals.first().map_or(0, |column| column.as_ref().len());
         while self.next < n_particles {
             let idx = self.next;
             self.next += 1;
-            let not_finite = self.columns.totals.iter().position(|column| !column[idx].is_finite());
+            let not_finite = self.columns.totals.iter().position(|column| !column.as_ref()[idx].is_finite());
             if let Some(primary) = not_finite {
                 self.refuse(idx, Refusal::NotFinite { primary });
                 continue;
@@ -93,12 +93,12 @@ impl Batch<'_, '_, '_, '_> {
     fn take<const L: usize>(&mut self, point: &mut Point<L>, lane: usize, idx: usize) {
         let mut is_zero = false;
         for (total, column) in point.total.iter_mut().zip(self.columns.totals) {
-            total[lane] = column[idx];
-            is_zero |= column[idx] == 0.0;
+            total[lane] = column.as_ref()[idx];
+            is_zero |= total[lane] == 0.0;
         }
         self.stages.fill(0);
         if is_zero {
-            self.system.absent(|j| self.columns.totals[j][idx], self.stages);
+            self.system.absent(|j| self.columns.totals[j].as_ref()[idx], self.stages);
         }
         for (place, stage) in point.stages.iter_mut().zip(&*self.stages) {
             place[lane] = *stage;
@@ -110,7 +110,7 @@ impl Batch<'_, '_, '_, '_> {
     #[inline(always)]
     fn recall<const L: usize>(&mut self, point: &mut Point<L>, lane: usize, idx: usize) {
         let Point { xi, amount, ionic, stages, .. } = point;
-        let mut memory = self.columns.memory.iter().map(|column| column[idx]);
+        let mut memory = self.columns.memory.iter().map(|column| column.as_ref()[idx]);
         for ((xi, stage), known) in xi.iter_mut().zip(&*stages).zip(memory.by_ref()) {
             let is_used = stage[lane] == 0 && known.abs() < LARGEST_LN;
             xi[lane] = if is_used { known } else { xi[lane] };
@@ -128,11 +128,11 @@ impl Batch<'_, '_, '_, '_> {
     fn store<const L: usize>(&mut self, point: &Point<L>, lane: usize, idx: usize) {
         let found = point.values[..self.system.n_primaries + self.system.n_secondaries].iter();
         for (column, value) in self.columns.concentrations.iter_mut().zip(found.chain(&point.amount)) {
-            column[idx] = value[lane];
+            column.as_mut()[idx] = value[lane];
         }
         let ends = point.xi.iter().chain(&point.amount).chain([&point.ionic]);
         for (column, value) in self.columns.memory.iter_mut().zip(ends) {
-            column[idx] = value[lane];
+            column.as_mut()[idx] = value[lane];
         }
         if point.ionic[lane] > MAX_IONIC_STRENGTH {
             self.refuse(idx, Refusal::IonicStrength { value: point.ionic[lane] });
@@ -141,7 +141,7 @@ impl Batch<'_, '_, '_, '_> {
 
     fn refuse(&mut self, particle: usize, why: Refusal) {
         for column in self.columns.concentrations.iter_mut().chain(&mut *self.columns.memory) {
-            column[particle] = f64::NAN;
+            column.as_mut()[particle] = f64::NAN;
         }
         if self.refused.is_none_or(|first| particle < first.particle) {
             self.refused = Some(Refused { particle, why });

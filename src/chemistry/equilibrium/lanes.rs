@@ -4,7 +4,7 @@
 //! and each lane must do what it would do alone.
 
 /// Exponential and logarithm of one lane.
-pub(super) use crate::maths::scalar::{exp as exp_of, ln as ln_of};
+pub(super) use crate::maths::vector::{exp as exp_of, ln as ln_of};
 
 /// Columns of one number per lane.
 pub(super) type Columns<const L: usize> = Vec<[f64; L]>;

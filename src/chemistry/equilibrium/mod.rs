@@ -59,14 +59,14 @@ pub struct Workspace {
 
 /// Particles to be speciated, as columns of equal length.
 #[derive(Debug)]
-pub struct Totals<'a, 'b> {
+pub struct Totals<'a, C, M> {
     /// One column per primary species, mol/m³.
-    pub totals: &'a [&'b [f64]],
+    pub totals: &'a [C],
     /// One column per entry of [`Speciation::n_memory`], or none. What stands there is where the iteration
     /// begins, NaN being nowhere; where it ended stands there afterwards.
-    pub memory: &'a mut [&'b mut [f64]],
+    pub memory: &'a mut [M],
     /// One column per species of [`Speciation::species`]: concentrations, and amounts of minerals.
-    pub concentrations: &'a mut [&'b mut [f64]],
+    pub concentrations: &'a mut [M],
 }
 
 /// A particle without a result.
@@ -124,6 +124,12 @@ impl Speciation {
         &self.species
     }
 
+    /// Whether the total of a primary species is a sum of amounts, so that it is never negative.
+    pub fn is_sum(&self, primary: usize) -> bool {
+        let entries = self.system.rows.iter().flat_map(|row| &row.entries);
+        entries.filter(|entry| entry.primary == primary).all(|entry| entry.nu > 0.0)
+    }
+
     pub fn n_primaries(&self) -> usize {
         self.system.n_primaries
     }
@@ -137,10 +143,10 @@ impl Speciation {
 
     /// Concentrations of all species from totals. After a refusal the other particles are solved all the same,
     /// and the refused one that comes first is told.
-    pub fn solve(
+    pub fn solve<C: AsRef<[f64]>, M: AsRef<[f64]> + AsMut<[f64]>>(
         &self,
         width: Width,
-        columns: Totals<'_, '_>,
+        columns: Totals<'_, C, M>,
         workspace: &mut Workspace,
     ) -> Result<Effort, Refused> {
         debug_assert_eq!(columns.totals.len(), self.system.n_primaries);
@@ -153,12 +159,12 @@ impl Speciation {
 
     /// Derivatives of all concentrations with all totals, column `species × n_primaries + primary`, where both
     /// are known: `concentrations` are what [`Speciation::solve`] found for `totals`.
-    pub fn derivatives<'b>(
+    pub fn derivatives<C: AsRef<[f64]>, D: AsRef<[f64]>, M: AsMut<[f64]>>(
         &self,
         width: Width,
-        totals: &[&'b [f64]],
-        concentrations: &[&'b [f64]],
-        out: &mut [&'b mut [f64]],
+        totals: &[C],
+        concentrations: &[D],
+        out: &mut [M],
         workspace: &mut Workspace,
     ) {
         debug_assert_eq!(out.len(), self.species.len() * self.system.n_primaries);
@@ -166,14 +172,18 @@ impl Speciation {
         width.run(Derivatives { system: &self.system, totals, concentrations, out, newton: many, stages });
     }
 
-    fn solve_closed(&self, closed: Closed, columns: Totals<'_, '_>) -> Result<Effort, Refused> {
+    fn solve_closed<C: AsRef<[f64]>, M: AsMut<[f64]>>(
+        &self,
+        closed: Closed,
+        columns: Totals<'_, C, M>,
+    ) -> Result<Effort, Refused> {
         let mut refused = None;
-        let first = columns.totals[0];
+        let first = columns.totals[0].as_ref();
         for (particle, &own) in first.iter().enumerate() {
-            let other = columns.totals.get(1).map_or(0.0, |column| column[particle]);
+            let other = columns.totals.get(1).map_or(0.0, |column| column.as_ref()[particle]);
             let found = closed.solve(own, other);
             for (column, value) in columns.concentrations.iter_mut().zip(found) {
-                column[particle] = value;
+                column.as_mut()[particle] = value;
             }
             if let Some(why) = closed.refusal(own, other).filter(|_| refused.is_none()) {
                 refused = Some(Refused { particle, why });
