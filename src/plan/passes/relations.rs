@@ -5,16 +5,17 @@
 //! found by writing every initial concentration as a constant plus a combination of basis
 //! functions (indicators of conditions, coordinates, anything not linear) and eliminating.
 //!
-//! Reactions at finite rates change components in fixed proportions: the extent of each reaction is one
-//! more basis function. What moves and what stays in its bin have no relation but that of constants.
+//! Components that reactions at finite rates change are always carried and make no relation: as the
+//! difference of two others one would have their errors, and near zero nothing but that. What moves and what
+//! stays in its bin have no relation but that of constants.
 
 use super::Draft;
 use super::species::retain_by;
 use crate::diagnostic::number;
 use crate::maths::operator::{Binary, Unary};
-use crate::plan::Plan;
 use crate::plan::chemistry::Method;
 use crate::plan::tape::{Operation, Register, Tape};
+use crate::plan::{Component, Plan};
 use std::collections::BTreeMap;
 
 /// A constant plus multiples of basis functions, which are named by a canonical text.
@@ -28,13 +29,19 @@ struct Affine {
 const TOLERANCE: f64 = 1e-12;
 
 pub(super) fn run(draft: &mut Draft) {
-    let forms: Vec<Affine> = (0..draft.plan.components.len()).map(|idx| form_of(&draft.plan, idx)).collect();
+    let forms: Vec<Affine> = draft.plan.components.iter().map(form_of).collect();
     let mut kept: Vec<usize> = Vec::new();
+    // Of those that are kept, the ones that others may follow from.
+    let mut still: Vec<usize> = Vec::new();
     let mut relations: Vec<Option<Relation>> = Vec::new();
     for (idx, form) in forms.iter().enumerate() {
-        let relation = express(form, &kept, &forms);
+        let is_changed = is_changed(&draft.plan, idx);
+        let relation = if is_changed { None } else { express(form, &still, &forms) };
         if relation.is_none() {
             kept.push(idx);
+        }
+        if relation.is_none() && !is_changed {
+            still.push(idx);
         }
         relations.push(relation);
     }
@@ -45,30 +52,27 @@ pub(super) fn run(draft: &mut Draft) {
     restore(draft, &relations, &kept);
 }
 
-/// A component over initial shapes and the extents of the reactions that change it.
-fn form_of(plan: &Plan, idx: usize) -> Affine {
-    let component = &plan.components[idx];
+/// A component over initial shapes; those of what stays in its bin are shapes of their own.
+fn form_of(component: &Component) -> Affine {
     let mut form = affine_of(&component.initial);
-    let kinetics = plan.chemistry.as_ref().and_then(|chemistry| chemistry.kinetics.as_ref());
-    // Of a network that is propagated when somebody looks, particles carry what has not reacted.
-    for (number, reaction) in kinetics
-        .filter(|kinetics| kinetics.method != Method::Observed)
-        .iter()
-        .flat_map(|kinetics| kinetics.reactions.iter().enumerate())
-    {
-        let change = reaction.changes.iter().find(|(component, _)| *component == idx);
-        if let Some((_, change)) = change {
-            form.terms.insert(format!("{EXTENT}{number}"), *change);
-        }
-    }
     if component.is_immobile {
         form.terms = form.terms.into_iter().map(|(name, value)| (format!("resting {name}"), value)).collect();
     }
     form
 }
 
-/// Names of extents begin with this; no text of a tape does.
-const EXTENT: &str = "extent ";
+/// Whether reactions change a component in steps.
+fn is_changed(plan: &Plan, component: usize) -> bool {
+    let kinetics = plan.chemistry.as_ref().and_then(|chemistry| chemistry.kinetics.as_ref());
+    // Of a network that is propagated when somebody looks, particles carry what has not reacted.
+    let in_steps = kinetics.filter(|kinetics| kinetics.method != Method::Observed);
+    in_steps.is_some_and(|kinetics| {
+        kinetics
+            .reactions
+            .iter()
+            .any(|reaction| reaction.changes.iter().any(|(other, _)| *other == component))
+    })
+}
 
 /// `α + Σ β_k U_k` over kept components.
 struct Relation {
@@ -114,6 +118,7 @@ fn restore(draft: &mut Draft, relations: &[Option<Relation>], kept: &[usize]) {
     retain_by(&mut draft.plan.components, &is_kept);
     let Some(chemistry) = &mut draft.plan.chemistry else { return };
     retain_by(&mut chemistry.floors, &is_kept);
+    // What changes is kept; only its number is another one.
     let kinetics = chemistry.kinetics.iter_mut().filter(|kinetics| kinetics.method != Method::Observed);
     for reaction in kinetics.flat_map(|kinetics| &mut kinetics.reactions) {
         let changes = std::mem::take(&mut reaction.changes);
@@ -166,18 +171,11 @@ fn express(form: &Affine, kept: &[usize], forms: &[Affine]) -> Option<Relation> 
         nalgebra::DMatrix::from_fn(names.len(), kept.len(), |row, column| entry(&forms[kept[column]], row));
     let target = nalgebra::DVector::from_fn(names.len(), |row, _| entry(form, row));
     let scale = target.amax();
-    let target_of = |row: usize| target[row].abs();
     let solved = matrix.clone().svd(true, true).solve(&target, 1e-13 * matrix.amax()).ok()?;
     let factors: Vec<f64> = solved.iter().map(|factor| snap(*factor)).collect();
-    let residual = &matrix * nalgebra::DVector::from_vec(factors.clone()) - &target;
+    let residual = (&matrix * nalgebra::DVector::from_vec(factors.clone()) - &target).amax();
     // Not a number is no relation, too.
-    if residual.amax().is_nan() || residual.amax() > TOLERANCE * scale {
-        return None;
-    }
-    // Coefficients of reactions are small beside concentrations, and hold by themselves.
-    let is_extent = |row: usize| names[row].contains(EXTENT);
-    if (0..names.len()).any(|row| is_extent(row) && residual[row].abs() > TOLERANCE * target_of(row).max(1.0))
-    {
+    if residual.is_nan() || residual > TOLERANCE * scale {
         return None;
     }
     let constant = kept
