@@ -11,8 +11,8 @@ use crate::syntax::climb::Built;
 use crate::syntax::grammar::Rule;
 use crate::syntax::tree::{
     Arrow, Assignment, Average, Axis, Boundary, Domain, Expr, ExprKind, Field, Flow, Function, Let, Measure,
-    Number, Output, Param, Particles, Qualifier, Rate, Reaction, Reference, Run, Species, StatementKind,
-    Target, Term, Times, UnaryOperator, Use, Zone,
+    Output, Param, Particles, Qualifier, Rate, Reaction, Reference, Run, Species, StatementKind, Target,
+    Term, Times, UnaryOperator, Use, Zone,
 };
 use pest::iterators::Pair;
 
@@ -117,18 +117,17 @@ fn qualifier(parts: &mut Parts) -> Built<Qualifier> {
 /// `2`, `-1`: without a unit, since a further word may follow.
 fn signed_number(place: Place, pair: Pair<Rule>) -> Built<Expr> {
     let span = span_at(place, &pair);
-    let text = pair.as_str();
-    let digits = text.trim_start_matches(['+', '-']).replace('_', "");
-    let sign_end = span.start + (text.len() - text.trim_start_matches(['+', '-']).len()) as u32;
-    let number = Expr {
-        span: Span { start: sign_end, ..span },
-        kind: ExprKind::Number(Number { digits, unit: None }),
-    };
-    if !text.starts_with('-') {
-        return Ok(Expr { span, ..number });
+    let mut inner = Parts::of(place, pair);
+    let sign = inner.take(Rule::sign);
+    let number = bare_number(place, inner.need(Rule::bare_number)?)?;
+    match sign.filter(|sign| sign.as_str() == "-") {
+        None => Ok(number),
+        Some(sign) => {
+            let operator = Spanned::new(UnaryOperator::Negate, span_at(place, &sign));
+            let span = Span { end: number.span.end, ..span };
+            Ok(Expr { span, kind: ExprKind::Unary { operator, operand: Box::new(number) } })
+        }
     }
-    let operator = Spanned::new(UnaryOperator::Negate, Span { end: sign_end, ..span });
-    Ok(Expr { span, kind: ExprKind::Unary { operator, operand: Box::new(number) } })
 }
 
 /// Two words, the second a value: `rate 1 /d`, `tolerance 1e-6`.

@@ -56,13 +56,16 @@ impl<'t> Pair<'_, 't> {
         }
     }
 
-    /// Whether the token is a minus that belongs to the value after it.
+    /// Whether the token is a minus, or the plus of a charge, that belongs to the value after it.
     fn is_sign(&self, position: usize) -> bool {
-        if self.word(position) != "-" || self.marks[position] {
+        if !matches!(self.word(position), "-" | "+") || self.marks[position] {
             return false;
         }
         let Some(before) = position.checked_sub(1) else { return false };
         let word = self.word(before);
+        if self.word(position) == "+" {
+            return word == "charge" && self.lexed.slice(self.keyword) == "species";
+        }
         match self.lexed.kind(self.line[before]) {
             Some(TokenKind::Symbol) => !matches!(word, ")" | "]" | "}") && !self.marks[before],
             Some(TokenKind::Word) => {
