@@ -321,6 +321,29 @@ fn rates_change_the_totals_of_what_is_in_equilibrium() {
     );
 }
 
+/// The ionic strength is that of all ions, also of those that take part in no equilibrium.
+#[test]
+fn other_ions_count_where_activities_are_asked_for() {
+    let scene = |activity: &str| {
+        let text = format!(
+            "{ACID}species Na charge 1, Sugar\ninitial HA = x * 1 mol/L/m, Na = x * x * 1 mol/L/m^2, Sugar = x * 2 mol/L/m\n\
+             chemistry activity {activity}\noutput total H, Na, Sugar at t = 1 d"
+        );
+        let compiled = compile_with(&text, Selection::None);
+        let equilibrium = chemistry(&compiled).equilibrium.clone().expect("equilibrium");
+        let name = |species: usize| compiled.plan.species[species].name.clone();
+        equilibrium
+            .primaries
+            .iter()
+            .map(|primary| (name(primary.species), primary.charge))
+            .collect::<Vec<_>>()
+    };
+    let sodium = ("Na".to_owned(), 1.0);
+    assert!(!scene("ideal").contains(&sodium));
+    assert_eq!(scene("davies").last(), Some(&sodium));
+    assert_eq!(scene("davies").len(), scene("ideal").len() + 1);
+}
+
 /// Spelling, order and units do not change what runs.
 #[test]
 fn the_plan_of_a_network_does_not_depend_on_its_writing() {

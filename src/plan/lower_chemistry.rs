@@ -35,7 +35,7 @@ pub(super) fn network(scenario: &Scenario, axes: &[Axis]) -> Result<Network, Vec
     let carried = Carried::new(scenario, &found);
     let mut problems = Vec::new();
     check_outputs(scenario, &carried, &mut problems);
-    check_settings(scenario, &found, &mut problems);
+    check_settings(scenario, &carried, &mut problems);
     let components = components(scenario, &carried, &mut problems);
     if crate::diagnostic::any_fatal(&problems) {
         return Err(problems);
@@ -205,7 +205,8 @@ fn check_outputs(scenario: &Scenario, carried: &Carried<'_>, problems: &mut Vec<
 }
 
 /// Settings that lack what they need, or have nothing to act on.
-fn check_settings(scenario: &Scenario, found: &Elimination, problems: &mut Vec<Diagnostic>) {
+fn check_settings(scenario: &Scenario, carried: &Carried<'_>, problems: &mut Vec<Diagnostic>) {
+    let found = carried.found;
     let settings = &scenario.chemistry;
     let Some(span) = settings.span else { return };
     let reacts = scenario.reactions.iter().any(|reaction| reaction.rate != Rate::Instant);
@@ -241,6 +242,19 @@ fn check_settings(scenario: &Scenario, found: &Elimination, problems: &mut Vec<D
                 .found("no `charge`")
                 .expected("the charge of every species in equilibrium")
                 .help("add for example `charge 2`, `charge -1`, or `charge 0`"),
+        );
+    } else if let Some(species) = spectators(scenario, carried)
+        .into_iter()
+        .map(|idx| &scenario.species[idx])
+        .find(|species| species.dimension == Dimension::MASS_CONCENTRATION)
+    {
+        problems.push(
+            Diagnostic::error(M024, format!("the ionic strength needs `{}` as an amount", species.name))
+                .at(species.span, "a mass concentration, with a charge")
+                .also(span, "activities are asked for here")
+                .found(Dimension::MASS_CONCENTRATION.describe())
+                .expected(Dimension::MOLAR_CONCENTRATION.describe())
+                .help("give its initial concentration in mol/L, or leave its `charge` out"),
         );
     } else if settings.activity == Activity::ExtendedDebyeHuckel
         && let Some(species) =
@@ -409,6 +423,20 @@ fn until_nothing_is_left(
     })
 }
 
+/// Ions that take part in no equilibrium: where activities are asked for, the ionic strength is theirs, too.
+fn spectators(scenario: &Scenario, carried: &Carried<'_>) -> Vec<usize> {
+    if scenario.chemistry.activity == Activity::Ideal {
+        return Vec::new();
+    }
+    let is_ion = |species: &usize| {
+        scenario.species[*species].charge.is_some_and(|charge| charge != 0.0)
+            && !carried.found.primaries.contains(species)
+            && carried.written(*species).is_none()
+            && !is_immobile(scenario, *species)
+    };
+    (0..scenario.species.len()).filter(is_ion).collect()
+}
+
 fn equilibrium(scenario: &Scenario, found: &Elimination, carried: &Carried<'_>) -> Option<Equilibrium> {
     if found.primaries.is_empty() && found.secondaries.is_empty() && found.minerals.is_empty() {
         return None;
@@ -434,8 +462,9 @@ fn equilibrium(scenario: &Scenario, found: &Elimination, carried: &Carried<'_>) 
         ln_solubility: written.ln_constant,
         coefficients: written.coefficients.clone(),
     };
+    let others = spectators(scenario, carried);
     Some(Equilibrium {
-        primaries: found.primaries.iter().map(primary).collect(),
+        primaries: found.primaries.iter().chain(&others).map(primary).collect(),
         secondaries: found.secondaries.iter().map(secondary).collect(),
         minerals: found.minerals.iter().map(mineral).collect(),
         activity: scenario.chemistry.activity,
