@@ -47,7 +47,7 @@ pub(super) fn network(scenario: &Scenario, axes: &[Axis]) -> Result<Network, Vec
     }
     let equilibrium = equilibrium(scenario, &found, &carried);
     let settings = &scenario.chemistry;
-    let chemistry = (kinetics.is_some() || equilibrium.is_some()).then(|| Chemistry {
+    let chemistry = (kinetics.is_some() || equilibrium.is_some()).then_some(Chemistry {
         kinetics,
         equilibrium,
         tolerance: settings.tolerance,

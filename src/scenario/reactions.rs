@@ -13,10 +13,10 @@ use crate::syntax::tree;
 
 pub(super) fn reactions<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> Option<Vec<Reaction>> {
     let names: Vec<&str> = statements.species.iter().map(|species| species.name.value.as_str()).collect();
-    let is_called_mineral = |species: &&tree::Species| {
+    let is_called_mineral = |species: &&'a tree::Species| {
         species.qualifiers.iter().any(|qualifier| qualifier.name.value == "mineral")
     };
-    let is_mineral: Vec<bool> = statements.species.iter().map(|species| is_called_mineral(species)).collect();
+    let is_mineral: Vec<bool> = statements.species.iter().map(is_called_mineral).collect();
     let all: Vec<Option<Vec<Reaction>>> = statements
         .reactions
         .iter()

@@ -79,7 +79,7 @@ fn every_function_is_described_and_cites_its_source() {
 #[test]
 fn every_formula_takes_just_its_arguments() {
     for item in ALL {
-        let used = |idx: usize| item.formula.iter().any(|step| *step == Step::Argument(idx));
+        let used = |idx: usize| item.formula.contains(&Step::Argument(idx));
         assert!((0..item.arguments.len()).all(used), "{} leaves an argument out", item.name);
         assert!(!used(item.arguments.len()), "{} takes one more", item.name);
         let n_taken = |step: &Step| match step {

@@ -111,6 +111,7 @@ fn needs(plan: &Plan, kinetics: &Kinetics) -> Needs {
     let together = plan.chemistry.as_ref().and_then(|chemistry| chemistry.equilibrium.as_ref());
     let together = together.map(members).unwrap_or_default();
     let laws: Vec<Vec<usize>> = (0..kinetics.reactions.len()).map(|idx| named(kinetics, idx)).collect();
+    let carriers = carriers(plan, kinetics);
     loop {
         let before = needs.species.clone();
         for reaction in &plan.reactions {
@@ -123,12 +124,8 @@ fn needs(plan: &Plan, kinetics: &Kinetics) -> Needs {
             together.iter().for_each(|species| needs.species[*species] = true);
         }
         for (idx, reaction) in kinetics.reactions.iter().enumerate() {
-            let changed = |item: usize| carriers(plan, kinetics, item);
-            needs.reactions[idx] |= reaction
-                .changes
-                .iter()
-                .flat_map(|(item, _)| changed(*item))
-                .any(|species| needs.species[species]);
+            let mut changed = reaction.changes.iter().flat_map(|(item, _)| &carriers[*item]);
+            needs.reactions[idx] |= changed.any(|species| needs.species[*species]);
             if needs.reactions[idx] {
                 laws[idx].iter().for_each(|species| needs.species[*species] = true);
                 // A closed form ends where the scarcest of what it uses up does.
@@ -136,8 +133,8 @@ fn needs(plan: &Plan, kinetics: &Kinetics) -> Needs {
                 let is_closed = matches!(kinetics.method, Method::Pair | Method::Saturation | Method::Zero);
                 spent
                     .filter(|_| is_closed)
-                    .flat_map(|(item, _)| changed(*item))
-                    .for_each(|species| needs.species[species] = true);
+                    .flat_map(|(item, _)| &carriers[*item])
+                    .for_each(|species| needs.species[*species] = true);
             }
         }
         if before == needs.species {
@@ -146,14 +143,16 @@ fn needs(plan: &Plan, kinetics: &Kinetics) -> Needs {
     }
 }
 
-/// The species that a changed component, or species, is seen in.
-fn carriers(plan: &Plan, kinetics: &Kinetics, item: usize) -> Vec<usize> {
+/// The species that each component, or species, which reactions change is seen in.
+fn carriers(plan: &Plan, kinetics: &Kinetics) -> Vec<Vec<usize>> {
     if kinetics.method == Method::Observed {
-        return vec![item];
+        return (0..plan.species.len()).map(|species| vec![species]).collect();
     }
-    let is_in =
-        |species: &usize| plan.species[*species].terms.iter().any(|(component, _)| *component == item);
-    (0..plan.species.len()).filter(is_in).collect()
+    let mut list = vec![Vec::new(); plan.components.len()];
+    for (idx, species) in plan.species.iter().enumerate() {
+        species.terms.iter().for_each(|(component, _)| list[*component].push(idx));
+    }
+    list
 }
 
 /// The species that a rate names.
@@ -187,8 +186,9 @@ pub(super) fn species_of_chemistry(plan: &Plan) -> Vec<bool> {
     let mut list = vec![false; plan.species.len()];
     let Some(chemistry) = &plan.chemistry else { return list };
     if let Some(kinetics) = &chemistry.kinetics {
+        let carriers = carriers(plan, kinetics);
         for (idx, reaction) in kinetics.reactions.iter().enumerate() {
-            let changed = reaction.changes.iter().flat_map(|(item, _)| carriers(plan, kinetics, *item));
+            let changed = reaction.changes.iter().flat_map(|(item, _)| carriers[*item].clone());
             changed.chain(named(kinetics, idx)).for_each(|species| list[species] = true);
         }
     }
