@@ -5,6 +5,7 @@
 use super::amount::worse;
 use super::react::Added;
 use crate::plan::Plan;
+use crate::plan::chemistry::Method;
 
 /// Smaller pivots are zero: stoichiometric coefficients are not that far apart.
 const ZERO: f64 = 1e-9;
@@ -20,6 +21,8 @@ const ZERO: f64 = 1e-9;
 pub fn invariants(plan: &Plan) -> Vec<Vec<f64>> {
     let n = plan.components.len();
     let kinetics = plan.chemistry.as_ref().and_then(|chemistry| chemistry.kinetics.as_ref());
+    // What is propagated when somebody looks changes no component.
+    let kinetics = kinetics.filter(|kinetics| kinetics.method != Method::Observed);
     let reactions = kinetics.map_or(&[][..], |kinetics| &kinetics.reactions);
     let mut rows: Vec<Vec<f64>> = Vec::new();
     for reaction in reactions {
