@@ -57,7 +57,9 @@ impl Clone for Speciation {
 impl Speciation {
     fn new(plan: &Plan) -> Result<Option<Self>, String> {
         let equilibrium = plan.chemistry.as_ref().and_then(|chemistry| chemistry.equilibrium.as_ref());
-        let (Some(equilibrium), Some(reactor)) = (equilibrium, Reactor::new(plan)?) else { return Ok(None) };
+        // A reactor of a network that is propagated when somebody looks is another one.
+        let Some(equilibrium) = equilibrium else { return Ok(None) };
+        let Some(reactor) = Reactor::new(plan)? else { return Ok(None) };
         let primaries = equilibrium.primaries.iter().map(|primary| primary.species);
         let secondaries = equilibrium.secondaries.iter().map(|secondary| secondary.species);
         let minerals = equilibrium.minerals.iter().map(|mineral| mineral.species);
