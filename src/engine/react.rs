@@ -7,6 +7,7 @@
 
 use super::average::Means;
 use super::mix;
+use super::observe::lane_sum;
 use super::program::{Program, Term};
 use crate::chemistry::{Batch, Failure, Reactor, Scratch, Work as Labour};
 use crate::state::particles::CHUNK;
@@ -43,6 +44,8 @@ pub struct Bench {
     before: Vec<[f64; CHUNK]>,
     mixed: Vec<[f64; CHUNK]>,
     chemistry: Scratch,
+    /// Per column, before a reaction.
+    sums: Vec<f64>,
     /// Of all chunks of a group.
     pub added: Vec<Added>,
     pub labour: Labour,
@@ -96,14 +99,14 @@ impl<const D: usize> Reaction<'_, D> {
     /// - Shape: columns of one chunk.
     pub fn react(&self, chunk: Chunk<'_, D>, bench: &mut Bench, sums: &mut [f64]) -> Result<(), Failure> {
         let Chunk { n, positions, slots, columns, memory } = chunk;
+        if self.is_single() {
+            return self.react_in_place(n, positions, columns, memory, bench);
+        }
         self.gather(slots, columns, bench, n);
         for (before, values) in bench.before.iter_mut().zip(&bench.values) {
             before[..n].copy_from_slice(&values[..n]);
         }
-        let mut places: [&[f64]; 3] = [&[]; 3];
-        for (axis, positions) in self.program.plan.axes.iter().zip(positions) {
-            places[axis.index] = positions;
-        }
+        let places = self.places(positions);
         let mut values: Vec<&mut [f64]> = bench.values.iter_mut().map(|column| &mut column[..n]).collect();
         for span in self.spans {
             let mut components: Vec<&mut [f64]> = values.iter_mut().map(|column| &mut **column).collect();
@@ -122,6 +125,51 @@ impl<const D: usize> Reaction<'_, D> {
         drop(values);
         self.scatter(slots, columns, bench, sums, n);
         self.leave(slots, bench, sums, n);
+        Ok(())
+    }
+
+    /// Whether what is stored is what reacts: no zones, and nothing in bins.
+    fn is_single(&self) -> bool {
+        self.immobile.is_empty() && matches!(self.program.terms[..], [Term::Column { fraction: 1.0, .. }])
+    }
+
+    /// Positions along x, y, z; nothing along axes that were left out.
+    fn places<'p>(&self, positions: [&'p [f64]; D]) -> [&'p [f64]; 3] {
+        let mut places: [&[f64]; 3] = [&[]; 3];
+        for (axis, positions) in self.program.plan.axes.iter().zip(positions) {
+            places[axis.index] = positions;
+        }
+        places
+    }
+
+    /// The same where nothing has to be gathered. The budget is that of the chunk's sums.
+    fn react_in_place(
+        &self,
+        n: usize,
+        positions: [&[f64]; D],
+        columns: &mut [&mut [f64]],
+        memory: &mut [f32],
+        bench: &mut Bench,
+    ) -> Result<(), Failure> {
+        let positions = self.places(positions);
+        bench.sums.clear();
+        bench.sums.extend(columns.iter().map(|column| lane_sum(&column[..n])));
+        for span in self.spans {
+            let mut components: Vec<&mut [f64]> = columns.iter_mut().map(|column| &mut **column).collect();
+            let batch = Batch {
+                positions,
+                t: span.t,
+                dt: span.dt,
+                components: &mut components,
+                memory: &mut *memory,
+            };
+            let labour = self.reactor.react(batch, &mut bench.chemistry)?;
+            add_work(&mut bench.labour, &labour);
+        }
+        for ((added, before), column) in bench.added.iter_mut().zip(&bench.sums).zip(&*columns) {
+            let sum = lane_sum(&column[..n]) - before;
+            added.add(Added { sum, size: sum.abs() });
+        }
         Ok(())
     }
 

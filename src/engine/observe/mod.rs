@@ -25,6 +25,7 @@ use look::{Look, Sums};
 use mixing::Mixing;
 use std::borrow::Cow;
 use tally::Tally;
+pub use tally::lane_sum;
 
 /// All snapshots of one due time, in the order of outputs.
 pub fn observe<const D: usize>(
