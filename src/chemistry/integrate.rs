@@ -14,7 +14,7 @@ use pulp::NullaryFnOnce;
 
 /// The local error is held to this share of the tolerance, so that errors that add up or grow stay within
 /// ten tolerances.
-const LOCAL_SHARE: f64 = 0.1;
+const LOCAL_SHARE: f64 = 0.5;
 
 /// A lane without a particle.
 const IDLE: u32 = u32::MAX;
