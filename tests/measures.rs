@@ -133,3 +133,133 @@ output profile T at t = 5 d on 20
     assert_eq!(found.len(), norms.len());
     assert!(found.iter().all(|value| value.is_nan()), "{found:?}");
 }
+
+/// T is 2 and `other` 1 mol/m³ everywhere; the references are 5 and 4, so that the relative errors are 3/5 and 3/4.
+const TWO_ERRORS: &str = "output profile T at t = 1 s on 8
+output profile other at t = 0 s, 2 s on 5
+reference g for T = 5 mol/m^3
+reference h for other = 4 mol/m^3
+param tol = 1e-3
+";
+
+/// Wherever a measure stands, those that it names are found; columns stay as they are written.
+#[test]
+fn a_measure_names_others_in_any_order() {
+    let measures = measures(&format!(
+        "{TWO_ERRORS}measure excess = err / tol
+measure digits = -log10(err)
+measure err    = max(err_T, err_h)
+measure err_T  = linf(profile.T - g) / linf(g)
+measure least  = min(err_h, err_T)
+measure err_h  = linf(profile.other - h) / linf(h)
+measure length = integral(profile.T) at t = 1 s
+measure half   = length / 2  at t = 0 s, 2 s
+"
+    ));
+    assert_close(&measures, &[750.0, -(0.75_f64.log10()), 0.75, 0.6, 0.6, 0.75, 8.0, 4.0]);
+}
+
+/// Each keeps its own range and times: naming a measure is naming its value.
+#[test]
+fn a_named_measure_keeps_its_own_range_and_times() {
+    let measures = measures(
+        "output profile T at t = 0 s, 1 s, 2 s on 8
+measure ratio = l1(profile.T) / part  over x = 0 m .. 2 m at t = 0 s, 1 s
+measure part  = l1(profile.T) over x = 1 m .. 2 m at t = 2 s
+measure again = part
+",
+    );
+    // 2 mol/m³ over 2 m at two times by 2 mol/m³ over 1 m at one.
+    assert_close(&measures, &[4.0, 2.0, 2.0]);
+}
+
+/// Functions of the language and of the scene, of numbers and bin by bin.
+#[test]
+fn functions_work_on_numbers_and_on_fields() {
+    let measures = measures(
+        "output profile T at t = 1 s on 4
+reference g for T = 5 mol/m^3
+let unit = 1 mol/m^3
+fn relative(a, b) = linf(a - b) / linf(b)
+fn capped(f) = min(f, relative(profile.T, g))
+measure root    = integral(sqrt(profile.T))^2 / 4 m
+measure logs    = mean(ln(profile.T / unit)) + exp(mean(log10(g / unit)))
+measure larger  = mean(max(profile.T, g) - min(profile.T, g))
+measure highest = maximum(min(x, 2.9 m) + 0 * x * profile.T / unit)
+measure power   = maximum(pow(profile.T / unit, 3)) + pow(maximum(profile.T / unit), -1)
+measure spread  = tanh(maximum(erf(x / 1 m * profile.T / (2 * unit)))) - sin(cos(minimum(profile.T) / unit)) - erfc(0.1 * steps)
+measure error   = relative(profile.T, g)
+measure low     = capped(0.3) + capped(0.9)
+measure bent    = mean(2 * 3 * T_of(profile.T))
+fn T_of(c) = if 1 < 2 then c else 2 * c
+",
+    );
+    let (erf_of_7_halves, erf_of_fifth) = (0.9999992569016276_f64, 0.22270258921047845);
+    let spread = erf_of_7_halves.tanh() - 2.0_f64.cos().sin() - (1.0 - erf_of_fifth);
+    let logs = 2.0_f64.ln() + 5.0_f64.log10().exp();
+    let expected = [8.0, logs, 3.0, 2.9, 8.5, spread, 0.6, 0.3 + 0.6, 12.0];
+    assert_close(&measures, &expected);
+}
+
+/// A norm inside a function of the scene decides for the others, as it does where it is written.
+#[test]
+fn a_norm_inside_a_function_decides_for_the_others() {
+    let measures = measures(
+        "output profile T at t = 1 s on 8
+output map T at t = 0 s, 1 s, 2 s on 16
+reference g for T = 5 mol/m^3
+fn relative(a, b) = l2(a - b) / l2(b)
+measure on_map     = relative(map.T, g)
+measure on_profile = l1(g) * relative(g, profile.T)
+",
+    );
+    assert_close(&measures, &[0.6, 20.0 * 1.5]);
+}
+
+/// Nothing is integrated in these scenes.
+#[test]
+fn sub_steps_are_none_without_integration() {
+    let measures = measures(
+        "output total T at t = 1 s\nmeasure work = sub_steps / steps\nmeasure n = sub_steps + steps\n",
+    );
+    assert_eq!(measures, [0.0, 2.0]);
+}
+
+/// A chain of any length is no matter of the stack.
+#[test]
+fn a_long_chain_of_measures_has_a_value() {
+    let n_measures = 5000;
+    let lines: Vec<String> =
+        (0..n_measures).map(|idx| format!("measure m{idx} = m{} + 1\n", idx + 1)).collect();
+    let rest = format!("output total T at t = 1 s\n{}measure m{n_measures} = steps\n", lines.concat());
+    let measures = measures(&rest);
+    assert_eq!(measures[0], f64::from(n_measures) + 2.0);
+    assert_eq!(measures[n_measures as usize], 2.0);
+}
+
+/// The form in the plan of what could be written before is the same: sweeps know their measures by it.
+#[test]
+fn the_plan_keeps_sums_and_products_of_constants_as_written() {
+    let scene = format!(
+        "{SCENE}output profile T at t = 1 s on 8
+param D = 3
+measure growth = linf(profile.T / (1 mol/m^3)) / (2 * D) - abs(-D + 1)^2
+measure named  = growth * 2
+"
+    );
+    let settings = lamella::scenario::Settings::default();
+    let checked = lamella::check(Sources::single("scene.lam", scene), &settings, &Options::default());
+    let compiled = checked.compiled.unwrap_or_else(|| panic!("{:#?}", checked.diagnostics));
+    use lamella::maths::operator::{Binary, Unary};
+    use lamella::plan::evaluation::Scalar;
+    let number = |value| Box::new(Scalar::Number(value));
+    let [growth, named] = &compiled.evaluation.measures[..] else { panic!("two measures") };
+    let Scalar::Binary(Binary::Subtract, quotient, square) = &growth.value else { panic!("{growth:?}") };
+    let Scalar::Binary(Binary::Divide, _, below) = &**quotient else { panic!("{quotient:?}") };
+    assert_eq!(**below, Scalar::Binary(Binary::Multiply, number(2.0), number(3.0)));
+    let negative = Box::new(Scalar::Unary(Unary::Negate, number(3.0)));
+    let sum = Box::new(Scalar::Binary(Binary::Add, negative, number(1.0)));
+    let size = Box::new(Scalar::Unary(Unary::Abs, sum));
+    assert_eq!(**square, Scalar::Binary(Binary::Power, size, number(2.0)));
+    assert_eq!(named.value, Scalar::Binary(Binary::Multiply, Box::new(Scalar::Measure(0)), number(2.0)));
+}

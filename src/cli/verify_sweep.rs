@@ -168,8 +168,8 @@ enum One {
 
 /// Names of the measures that hang on the clock.
 fn timed(evaluation: &Evaluation) -> BTreeSet<&str> {
-    let timed = evaluation.measures.iter().filter(|measure| measure.value.is_timed());
-    timed.map(|measure| measure.name.as_str()).collect()
+    let measures = evaluation.measures.iter().zip(evaluation.is_timed());
+    measures.filter(|(_, is_timed)| *is_timed).map(|(measure, _)| measure.name.as_str()).collect()
 }
 
 /// Makes the tables again in a folder that is taken away, and compares them with those that are there;

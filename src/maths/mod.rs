@@ -6,6 +6,7 @@
 pub mod chacha;
 pub mod normal;
 pub mod operator;
+pub mod order;
 pub mod pentadiagonal;
 pub mod quadrature;
 pub mod scalar;

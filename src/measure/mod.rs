@@ -135,9 +135,8 @@ pub fn evaluate(
             }
         }
     }
-    for measure in &evaluation.measures {
-        let value = scalar::value(&run, &references, measure)
-            .map_err(|reason| format!("The measure `{}` has no value: {reason}", measure.name))?;
+    let values = scalar::values(&run, &references, evaluation)?;
+    for (measure, value) in evaluation.measures.iter().zip(values) {
         evaluated.measures.push(MeasureValue {
             name: measure.name.clone(),
             unit: measure.unit.clone(),

@@ -3,22 +3,35 @@
 //! Owns facts, norms and their arithmetic. May use the other parts of `measure`. It deliberately
 //! rounds nothing.
 
-use super::field::{Norms, values};
+use super::field::{self, Norms};
 use super::grid::Grid;
 use super::observed::Run;
 use super::reference::Prepared;
 use crate::engine::snapshot::Outcome;
-use crate::plan::evaluation::{Fact, Field, Measure, Norm, SAME_TIME, Scalar};
+use crate::plan::evaluation::{Evaluation, Fact, Field, Measure, Norm, SAME_TIME, Scalar};
 
-/// The value of a measure; an error is the end of a sentence about it.
-pub(super) fn value(run: &Run, references: &[Prepared], measure: &Measure) -> Result<f64, String> {
-    Evaluator { run, references, measure }.scalar(&measure.value)
+/// The values of all measures, in the order of the scene.
+pub(super) fn values(
+    run: &Run,
+    references: &[Prepared],
+    evaluation: &Evaluation,
+) -> Result<Vec<f64>, String> {
+    let mut known: Vec<Option<f64>> = vec![None; evaluation.measures.len()];
+    for idx in evaluation.order() {
+        let measure = &evaluation.measures[idx];
+        let value = Evaluator { run, references, measure, known: &known }.scalar(&measure.value);
+        let no_value = |reason| format!("The measure `{}` has no value: {reason}", measure.name);
+        known[idx] = Some(value.map_err(no_value)?);
+    }
+    Ok(known.into_iter().flatten().collect())
 }
 
 struct Evaluator<'a> {
     run: &'a Run<'a>,
     references: &'a [Prepared<'a>],
     measure: &'a Measure,
+    /// Values of the measures that come before it.
+    known: &'a [Option<f64>],
 }
 
 impl Evaluator<'_> {
@@ -26,6 +39,9 @@ impl Evaluator<'_> {
         Ok(match scalar {
             Scalar::Number(number) => *number,
             Scalar::Fact(fact) => value_of(*fact, self.run.outcome),
+            Scalar::Measure(idx) => {
+                self.known.get(*idx).copied().flatten().ok_or("it names a measure that needs it, or none.")?
+            }
             Scalar::Norm(norm, output_idx, field) => self.norm(*norm, *output_idx, field)?,
             Scalar::Unary(operator, a) => operator.apply(self.scalar(a)?),
             Scalar::Binary(operator, a, b) => operator.apply(self.scalar(a)?, self.scalar(b)?),
@@ -33,7 +49,7 @@ impl Evaluator<'_> {
     }
 
     fn norm(&self, norm: Norm, output_idx: usize, field: &Field) -> Result<f64, String> {
-        let field = values(self.run, self.references, field, output_idx)?;
+        let field = field::values(self.run, self.references, field, output_idx)?;
         let is_within = self.bins_within(&field.grid)?;
         let wanted = self.times_within(&field.times.iter().map(|time| time.t).collect::<Vec<_>>())?;
         let mut norms = Norms::new(field.grid.weight);
@@ -100,5 +116,6 @@ fn value_of(fact: Fact, outcome: &Outcome) -> f64 {
         Fact::MassDefect => outcome.worst_defect(),
         Fact::Particles => outcome.n_particles as f64,
         Fact::Steps => outcome.n_steps as f64,
+        Fact::SubSteps => outcome.sub_steps().unwrap_or(0) as f64,
     }
 }

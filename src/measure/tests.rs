@@ -295,3 +295,31 @@ fn a_reference_with_wrong_arguments_is_refused_with_a_sentence() {
         assert!(sentence.ends_with('.'), "{sentence}");
     }
 }
+
+/// Through any number of names; the clock of one leaves the others alone.
+#[test]
+fn what_names_a_timed_measure_is_timed() {
+    let of = |value| measure(value);
+    let sum = |a, b| Scalar::Binary(Binary::Add, Box::new(Scalar::Measure(a)), Box::new(Scalar::Measure(b)));
+    let evaluation = parabola_evaluation(vec![
+        of(sum(1, 2)),
+        of(Scalar::Unary(Unary::Abs, Box::new(Scalar::Measure(3)))),
+        of(Scalar::Fact(Fact::SubSteps)),
+        of(Scalar::Fact(Fact::CpuTime)),
+        of(sum(2, 2)),
+    ]);
+    assert_eq!(evaluation.is_timed(), [true, true, false, true, false]);
+}
+
+/// No scene has these, but a file that someone has changed may.
+#[test]
+fn a_measure_that_names_itself_or_none_is_refused() {
+    let (plan, snapshots) = parabola_run();
+    for wrong in
+        [vec![Scalar::Measure(0)], vec![Scalar::Measure(1), Scalar::Measure(0)], vec![Scalar::Measure(7)]]
+    {
+        let evaluation = parabola_evaluation(wrong.into_iter().map(measure).collect());
+        let found = evaluate(&plan, &evaluation, &snapshots, &outcome());
+        assert!(found.is_err_and(|reason| reason.contains("names a measure")));
+    }
+}

@@ -5,6 +5,7 @@
 
 use super::tape::{Binary, Tape, Unary};
 use super::{OutputKind, Quantity};
+use crate::maths::order::order;
 pub use crate::scenario::{Fact, Norm, SAME_TIME};
 use serde::{Deserialize, Serialize};
 
@@ -13,6 +14,30 @@ use serde::{Deserialize, Serialize};
 pub struct Evaluation {
     pub references: Vec<Reference>,
     pub measures: Vec<Measure>,
+}
+
+impl Evaluation {
+    /// The measures by number, each after those that it names. Measures of a circle, which no scene has
+    /// but a file may, come in some order.
+    pub fn order(&self) -> Vec<usize> {
+        let n_measures = self.measures.len();
+        let needs = self.measures.iter().map(|measure| {
+            let mut needs = Vec::new();
+            measure.value.measures(&mut needs);
+            needs.retain(|&idx| idx < n_measures);
+            needs
+        });
+        order(&needs.collect::<Vec<_>>()).items
+    }
+
+    /// For each measure whether it hangs on the clock: two runs of one plan give other values.
+    pub fn is_timed(&self) -> Vec<bool> {
+        let mut is_timed = vec![false; self.measures.len()];
+        for idx in self.order() {
+            is_timed[idx] = self.measures[idx].value.is_timed(&is_timed);
+        }
+        is_timed
+    }
 }
 
 /// A solution that results are held against.
@@ -54,6 +79,8 @@ pub struct Measure {
 pub enum Scalar {
     Number(f64),
     Fact(Fact),
+    /// The value of another measure, by its index into `Evaluation::measures`.
+    Measure(usize),
     /// On the bins and times of an output of the plan, given by its index.
     Norm(Norm, usize, Box<Field>),
     Unary(Unary, Box<Scalar>),
@@ -61,13 +88,27 @@ pub enum Scalar {
 }
 
 impl Scalar {
-    /// Whether it hangs on the clock: two runs of one plan give other values.
-    pub fn is_timed(&self) -> bool {
+    /// Whether it hangs on the clock, where that is known of the measures that it names.
+    fn is_timed(&self, measures: &[bool]) -> bool {
         match self {
             Self::Fact(fact) => matches!(fact, Fact::WallTime | Fact::CpuTime),
+            Self::Measure(idx) => measures.get(*idx).copied().unwrap_or(false),
             Self::Number(_) | Self::Norm(..) => false,
-            Self::Unary(_, operand) => operand.is_timed(),
-            Self::Binary(_, left, right) => left.is_timed() || right.is_timed(),
+            Self::Unary(_, operand) => operand.is_timed(measures),
+            Self::Binary(_, left, right) => left.is_timed(measures) || right.is_timed(measures),
+        }
+    }
+
+    /// Adds the measures that it names.
+    fn measures(&self, list: &mut Vec<usize>) {
+        match self {
+            Self::Measure(idx) => list.push(*idx),
+            Self::Number(_) | Self::Fact(_) | Self::Norm(..) => {}
+            Self::Unary(_, operand) => operand.measures(list),
+            Self::Binary(_, left, right) => {
+                left.measures(list);
+                right.measures(list);
+            }
         }
     }
 }

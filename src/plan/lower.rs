@@ -217,6 +217,7 @@ fn lower_scalar(scalar: &scenario::Scalar) -> evaluation::Scalar {
     match scalar {
         From::Number(value) => To::Number(*value),
         From::Fact(fact) => To::Fact(*fact),
+        From::Measure(idx) => To::Measure(*idx),
         From::Norm(norm, output_idx, field) => To::Norm(*norm, *output_idx, Box::new(lower_field(field))),
         From::Unary(operator, a) => To::Unary(*operator, Box::new(lower_scalar(a))),
         From::Binary(operator, a, b) => {

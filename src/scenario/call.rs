@@ -2,6 +2,7 @@
 
 use super::check::{Allow, Call, Checker};
 use super::expression::{Expr, Type};
+use super::results::norm_of;
 use super::scope::{BUILT_IN_FUNCTIONS, Locals, Origin};
 use crate::catalog::rate;
 use crate::diagnostic::Diagnostic;
@@ -61,7 +62,10 @@ impl<'a> Checker<'a> {
             // A function of the scene comes before one of the catalogue.
             (Some(statement), _) => self.user_function(statement, values, function.span, span, allow),
             (None, Some(item)) => self.of_catalogue(item, values, function.span, span),
-            (None, None) => self.built_in(name, values, function.span, span),
+            (None, None) => match norm_of(name) {
+                Some(norm) if allow.results => self.norm(norm, function, values, span),
+                _ => self.built_in(name, values, function.span, span),
+            },
         }
     }
 
@@ -149,7 +153,7 @@ impl<'a> Checker<'a> {
         body.map(|body| Expr { span, ..body })
     }
 
-    fn has_arguments(&mut self, name: &str, span: Span, expected: usize, found: usize) -> bool {
+    pub(super) fn has_arguments(&mut self, name: &str, span: Span, expected: usize, found: usize) -> bool {
         if expected == found {
             return true;
         }

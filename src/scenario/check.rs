@@ -1,6 +1,7 @@
 //! Written expressions to typed ones: names looked up, units converted, dimensions checked.
 
 use super::expression::{Expr, Node, Type};
+use super::results::Measuring;
 use super::scope::{BUILT_IN_FUNCTIONS, Locals, Origin, Progress, Scope};
 use crate::diagnostic::codes::{D005, D006, D008, D009, U101, U103, U106, U108};
 use crate::diagnostic::{Diagnostic, precise};
@@ -18,13 +19,16 @@ pub(super) struct Allow {
     pub position: bool,
     pub time: bool,
     pub species: bool,
+    /// Results of a run, and norms of them.
+    pub results: bool,
 }
 
 impl Allow {
-    pub(super) const CONSTANT: Self = Self { position: false, time: false, species: false };
-    pub(super) const INITIAL: Self = Self { position: true, time: false, species: true };
-    pub(super) const RATE: Self = Self { position: true, time: true, species: true };
-    pub(super) const REFERENCE: Self = Self { position: true, time: true, species: false };
+    pub(super) const CONSTANT: Self = Self { position: false, time: false, species: false, results: false };
+    pub(super) const INITIAL: Self = Self { position: true, time: false, species: true, results: false };
+    pub(super) const RATE: Self = Self { position: true, time: true, species: true, results: false };
+    pub(super) const REFERENCE: Self = Self { position: true, time: true, species: false, results: false };
+    pub(super) const MEASURE: Self = Self { position: true, time: false, species: false, results: true };
 }
 
 /// A function being put in.
@@ -46,6 +50,8 @@ pub(super) struct Checker<'a> {
     /// Whether the initial concentration of some species is wrong.
     pub is_initial_wrong: bool,
     pub(super) call_stack: Vec<Call>,
+    /// What a measure may speak of, while measures are checked.
+    pub(super) measuring: Option<Measuring>,
     /// Constants whose values are being worked out, each for the one before it.
     pub(super) running: Vec<String>,
 }
@@ -137,6 +143,9 @@ impl<'a> Checker<'a> {
 
     fn path(&mut self, path: &'a [tree::Name], span: Span, allow: Allow, locals: &Locals) -> Option<Expr> {
         let [name] = path else {
+            if allow.results {
+                return self.result_of_output(path, span);
+            }
             self.report(
                 Diagnostic::error(D005, "results cannot be used here")
                     .at(span, "a result of the run")
@@ -164,6 +173,11 @@ impl<'a> Checker<'a> {
             "t" => return self.variable(Node::Time, Dimension::TIME, span, allow.time, text, "the time"),
             "pi" => return Some(Expr::constant(std::f64::consts::PI, Type::Number(Dimension::NONE), span)),
             _ => {}
+        }
+        if allow.results
+            && let Some(result) = self.named_result(name, span)
+        {
+            return result;
         }
         self.named(text, span, allow)
     }
@@ -316,21 +330,10 @@ impl<'a> Checker<'a> {
 
     fn binary(&mut self, operator: BinaryOperator, a: Expr, b: Expr, span: Span) -> Option<Expr> {
         use BinaryOperator as Op;
-        let (op, sign) = match operator {
-            Op::Add => (Binary::Add, "+"),
-            Op::Subtract => (Binary::Subtract, "-"),
-            Op::Multiply => (Binary::Multiply, "*"),
-            Op::Divide => (Binary::Divide, "/"),
-            Op::Power => return self.power(a, b, span),
-            Op::Less => (Binary::Less, "<"),
-            Op::LessEqual => (Binary::LessEqual, "<="),
-            Op::Greater => (Binary::Greater, ">"),
-            Op::GreaterEqual => (Binary::GreaterEqual, ">="),
-            Op::Equal => (Binary::Equal, "=="),
-            Op::NotEqual => (Binary::NotEqual, "!="),
-            Op::And => (Binary::And, "and"),
-            Op::Or => (Binary::Or, "or"),
-        };
+        if operator == Op::Power {
+            return self.power(a, b, span);
+        }
+        let (op, sign) = operator_of(operator);
         let is_logic = matches!(operator, Op::And | Op::Or);
         for side in [&a, &b] {
             if is_logic != (side.kind == Type::Truth) {
@@ -416,6 +419,26 @@ impl<'a> Checker<'a> {
             return None;
         };
         Some(Expr::select(condition, then, otherwise, kind, span))
+    }
+}
+
+/// The operator that a written one stands for, and how it is written.
+pub(super) fn operator_of(operator: BinaryOperator) -> (Binary, &'static str) {
+    use BinaryOperator as Op;
+    match operator {
+        Op::Add => (Binary::Add, "+"),
+        Op::Subtract => (Binary::Subtract, "-"),
+        Op::Multiply => (Binary::Multiply, "*"),
+        Op::Divide => (Binary::Divide, "/"),
+        Op::Power => (Binary::Power, "^"),
+        Op::Less => (Binary::Less, "<"),
+        Op::LessEqual => (Binary::LessEqual, "<="),
+        Op::Greater => (Binary::Greater, ">"),
+        Op::GreaterEqual => (Binary::GreaterEqual, ">="),
+        Op::Equal => (Binary::Equal, "=="),
+        Op::NotEqual => (Binary::NotEqual, "!="),
+        Op::And => (Binary::And, "and"),
+        Op::Or => (Binary::Or, "or"),
     }
 }
 

@@ -69,6 +69,7 @@ pub fn resolve(
         species_dimensions: vec![None; statements.species.len()],
         is_initial_wrong: false,
         call_stack: Vec::new(),
+        measuring: None,
         running: Vec::new(),
     };
     define_names(&mut checker, &statements, &overrides);
@@ -206,8 +207,8 @@ fn define_names<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>, over
             scope.define(name, Origin::Reference(idx), &axes, diagnostics);
         }
     }
-    for (_, statement) in &statements.measures {
-        scope.define(&statement.name, Origin::Measure, &axes, diagnostics);
+    for (idx, (_, statement)) in statements.measures.iter().enumerate() {
+        scope.define(&statement.name, Origin::Measure(idx), &axes, diagnostics);
     }
 }
 

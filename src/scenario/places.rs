@@ -4,22 +4,21 @@
 //! the scenario's types and names. It deliberately checks no dimension: `measure` does.
 
 use super::check::Checker;
-use super::measure::{FieldTarget, NORMS};
-use super::observe::OUTPUTS;
-use super::scope::{Origin, Scope};
+use super::measure::FieldTarget;
 use super::{Output, OutputKind, Reference};
 use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{M017, U108};
 use crate::source::Span;
-use crate::syntax::tree::{BinaryOperator, Expr, ExprKind, Name};
+use std::rc::Rc;
 
 /// Times that are asked for by number match those of an output to this relative distance.
 pub const SAME_TIME: f64 = 1e-9;
 
 /// What measures may speak of.
-pub(super) struct Results<'r> {
-    pub outputs: &'r [Output],
-    pub references: &'r [Reference],
+#[derive(Debug, Clone)]
+pub(super) struct Results {
+    pub outputs: Rc<[Output]>,
+    pub references: Rc<[Reference]>,
     /// Whether these lists are whole, so that an absent entry is the user's mistake.
     pub are_whole: bool,
     /// Times that the measure is restricted to.
@@ -67,7 +66,7 @@ impl Places {
     }
 
     /// The candidates that are left when the measure's times and its other norms have had their say.
-    pub(super) fn chosen(&self, results: &Results<'_>) -> Vec<usize> {
+    pub(super) fn chosen(&self, results: &Results) -> Vec<usize> {
         let all = self.candidates();
         let keep = |list: &[usize], test: &dyn Fn(usize) -> bool| -> Vec<usize> {
             let kept: Vec<usize> = list.iter().copied().filter(|&idx| test(idx)).collect();
@@ -92,7 +91,7 @@ pub(super) fn has_times(output: &Output, wanted: Option<&[f64]>) -> bool {
     wanted.is_none_or(|times| times.iter().all(is_there))
 }
 
-impl Results<'_> {
+impl Results {
     /// Distinct places among the outputs that pass a test.
     fn places(&self, test: impl Fn(&Output) -> bool) -> Vec<usize> {
         let is_same = |a: &Output, b: &Output| a.kind == b.kind && a.bins == b.bins && a.times == b.times;
@@ -116,65 +115,6 @@ impl Results<'_> {
             named: None,
             possible: Some(self.places(|output| target.outputs().contains(&output.kind))),
             fitting: Some(self.places(|output| target.is_in(output))),
-        }
-    }
-
-    /// Adds the outputs that norms of an expression are taken on for certain.
-    pub(super) fn decide(&mut self, expr: &Expr, scope: &Scope<'_>) {
-        match &expr.kind {
-            ExprKind::Call { function, arguments } => {
-                let is_norm = NORMS.iter().any(|(word, _)| *word == function.value);
-                for argument in arguments {
-                    if !is_norm {
-                        self.decide(&argument.value, scope);
-                    } else if let [only] = self.seen(&argument.value, scope).chosen(self)[..] {
-                        self.decided.push(only);
-                    }
-                }
-            }
-            ExprKind::Unary { operand, .. } => self.decide(operand, scope),
-            ExprKind::Binary { left, right, .. } => {
-                self.decide(left, scope);
-                self.decide(right, scope);
-            }
-            _ => {}
-        }
-    }
-
-    /// The places of an expression that is not checked yet; what is wrong with it is told elsewhere.
-    fn seen(&self, expr: &Expr, scope: &Scope<'_>) -> Places {
-        match &expr.kind {
-            ExprKind::Path(path) => self.seen_path(path, scope),
-            ExprKind::Call { arguments, .. } => {
-                arguments.first().map(|argument| self.seen(&argument.value, scope)).unwrap_or_default()
-            }
-            ExprKind::Unary { operand, .. } => self.seen(operand, scope),
-            ExprKind::Binary { operator, left, .. } if operator.value == BinaryOperator::Power => {
-                self.seen(left, scope)
-            }
-            ExprKind::Binary { left, right, .. } => self.seen(left, scope).both(&self.seen(right, scope)),
-            _ => Places::default(),
-        }
-    }
-
-    fn seen_path(&self, path: &[Name], scope: &Scope<'_>) -> Places {
-        let origin = |name: &Name| scope.get(&name.value).map(|entry| entry.origin);
-        let species = |name: &Name| match origin(name) {
-            Some(Origin::Species(idx)) => Some(idx),
-            _ => None,
-        };
-        match path {
-            [name] => match scope.reference(&name.value) {
-                Some(idx) if idx < self.references.len() => self.of_reference(idx),
-                _ => Places::default(),
-            },
-            [kind, names @ ..] => {
-                let kind = OUTPUTS.iter().find(|(word, _)| *word == kind.value).map(|(_, kind)| *kind);
-                let species: Option<Vec<usize>> = names.iter().map(species).collect();
-                let target = kind.zip(species).and_then(|(kind, species)| FieldTarget::of(kind, &species));
-                kind.zip(target).map(|(kind, target)| self.of_output(kind, target)).unwrap_or_default()
-            }
-            [] => Places::default(),
         }
     }
 }
@@ -201,7 +141,7 @@ impl FieldTarget {
 /// The one output that a norm is taken on, or a message.
 pub(super) fn place_of(
     checker: &mut Checker<'_>,
-    results: &Results<'_>,
+    results: &Results,
     norm: &str,
     places: &Places,
     span: Span,

@@ -17,7 +17,7 @@ const MOST_TIMES: usize = 5;
 /// Reports a time that an output of the measure does not have, and a range without any of its bins.
 pub(super) fn check_restrictions(
     checker: &mut Checker<'_>,
-    results: &Results<'_>,
+    results: &Results,
     written: &tree::Measure,
     value: &Scalar,
     over: Option<(usize, f64, f64)>,
@@ -43,7 +43,7 @@ pub(super) fn check_restrictions(
 
 fn outputs_of(value: &Scalar, list: &mut Vec<usize>) {
     match value {
-        Scalar::Number(_) | Scalar::Fact(_) => {}
+        Scalar::Number(_) | Scalar::Fact(_) | Scalar::Measure(_) => {}
         Scalar::Norm(_, output_idx, _) => list.push(*output_idx),
         Scalar::Unary(_, a) => outputs_of(a, list),
         Scalar::Binary(_, a, b) => {

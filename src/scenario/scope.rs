@@ -17,7 +17,7 @@ pub(super) enum Origin<'a> {
     Species(usize),
     Reaction,
     Reference(usize),
-    Measure,
+    Measure(usize),
 }
 
 impl Origin<'_> {
@@ -29,7 +29,7 @@ impl Origin<'_> {
             Origin::Species(_) => "a species",
             Origin::Reaction => "a reaction",
             Origin::Reference(_) => "a reference",
-            Origin::Measure => "a measure",
+            Origin::Measure(_) => "a measure",
         }
     }
 }

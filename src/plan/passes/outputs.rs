@@ -31,7 +31,7 @@ pub(super) fn run(draft: &mut Draft) {
 /// Norms keep the output they are taken on, or its twin.
 fn renumber(scalar: &mut Scalar, places: &[usize]) {
     match scalar {
-        Scalar::Number(_) | Scalar::Fact(_) => {}
+        Scalar::Number(_) | Scalar::Fact(_) | Scalar::Measure(_) => {}
         Scalar::Norm(_, output_idx, _) => *output_idx = places[*output_idx],
         Scalar::Unary(_, a) => renumber(a, places),
         Scalar::Binary(_, a, b) => {

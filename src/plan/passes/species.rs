@@ -127,7 +127,7 @@ fn renumber_evaluation(draft: &mut Draft, renumbered: &[Option<usize>], quantity
 
 fn renumber_scalar(scalar: &mut Scalar, is_kept: &[bool], quantity: &impl Fn(&mut Quantity)) {
     match scalar {
-        Scalar::Number(_) | Scalar::Fact(_) => {}
+        Scalar::Number(_) | Scalar::Fact(_) | Scalar::Measure(_) => {}
         Scalar::Norm(_, _, field) => renumber_field(field, is_kept, quantity),
         Scalar::Unary(_, a) => renumber_scalar(a, is_kept, quantity),
         Scalar::Binary(_, a, b) => {

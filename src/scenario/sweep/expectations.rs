@@ -58,7 +58,7 @@ pub(super) fn measure_name(
 ) -> Option<String> {
     match checker.scope.get(&name.value).map(|entry| entry.origin) {
         // A measure that is wrong has been reported where it stands.
-        Some(Origin::Measure) if measures.iter().all(|measure| measure.name != name.value) => return None,
+        Some(Origin::Measure(_)) if measures.iter().all(|measure| measure.name != name.value) => return None,
         // The definition may be what is misspelt: all uses of the name decide together.
         None if !is_fact(&name.value) => {
             checker.scope.note_undefined(&name.value, name.span);
