@@ -100,8 +100,8 @@ impl Symbolic {
     pub fn factor(&self, a: &mut [Lane]) {
         for pivot in &self.pivots {
             let mut inverse = a[pivot.slot as usize];
-            for l in 0..LANES {
-                inverse[l] = 1.0 / inverse[l];
+            for entry in &mut inverse {
+                *entry = 1.0 / *entry;
             }
             a[pivot.slot as usize] = inverse;
             for &[slot, _] in &self.lower[pivot.lower.clone()] {

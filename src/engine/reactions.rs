@@ -29,6 +29,8 @@ pub struct Reactions {
     step: Span,
     /// Per immobile component and slot, the concentration in the fluid of the bin.
     pub immobile: Vec<Vec<f64>>,
+    /// Its sums over bins at the beginning.
+    pub immobile_before: Vec<f64>,
     /// Per component.
     pub added: Vec<Added>,
     /// Of everything that was integrated.
@@ -110,6 +112,7 @@ impl Reactions {
                 block.memory.resize(block.n_particles, 0.0);
             }
         }
+        let immobile = initial::immobile(program)?;
         let splitting = plan.chemistry.as_ref().map(|chemistry| chemistry.splitting);
         Ok(Self {
             reactor,
@@ -118,7 +121,8 @@ impl Reactions {
             is_symmetric: splitting == Some(Splitting::Strang),
             spans: Vec::new(),
             step: Span { t: 0.0, dt: 0.0 },
-            immobile: initial::immobile(program)?,
+            immobile_before: immobile.iter().map(|bins| bins.iter().sum()).collect(),
+            immobile,
             added: vec![Added::default(); plan.components.len()],
             labour: Labour::default(),
             negative: Vec::new(),
@@ -136,6 +140,7 @@ impl Reactions {
             spans: self.spans.clone(),
             step: self.step,
             immobile: self.immobile.clone(),
+            immobile_before: self.immobile_before.clone(),
             added: self.added.clone(),
             labour: Labour::default(),
             negative: Vec::new(),

@@ -298,6 +298,16 @@ impl<'a, const D: usize> Run<'a, D> {
         self.program.plan.components[idx].name.clone()
     }
 
+    /// Per component Σ|value| at the beginning, over particles.
+    fn initial_sizes(&self) -> Vec<f64> {
+        let (program, plan) = (&self.program, self.program.plan);
+        let n_slots = program.roles.len();
+        let carried = (0..program.n_components()).map(|component| self.before[component * n_slots].size);
+        let per_bin = plan.particles.count as f64 / program.grid.n_bins() as f64;
+        let in_bins = self.reactions.immobile_before.iter().map(|sum| sum * per_bin);
+        carried.chain(in_bins).collect()
+    }
+
     /// Names the first particle whose value is not finite; if only a sum is not, the amount.
     #[cold]
     fn find_non_finite(&self, step: u64) -> RunError {
@@ -362,7 +372,8 @@ impl<'a, const D: usize> Run<'a, D> {
             amount::amounts(&self.blocks, self.program.n_columns()).iter().map(|amount| amount.sum).collect();
         let mut defects = amount::defects(&self.program, &self.before, &self.reactions.added, &after);
         defects.resize(self.program.plan.components.len(), 0.0);
-        let reacted = conserved::defects(&conserved::invariants(self.program.plan), &self.reactions.added);
+        let invariants = conserved::invariants(self.program.plan);
+        let reacted = conserved::defects(&invariants, &self.reactions.added, &self.initial_sizes());
         defects.iter_mut().zip(reacted).for_each(|(own, other)| *own = amount::worse(*own, other));
         Ok(defects)
     }

@@ -80,7 +80,7 @@ mod tests {
         for k in [1e-12, 1e-6, 1e-3, 0.3, 1.0, 50.0, 1e9] {
             for s in [1e-9, 1e-3, 0.5, 0.999, 1.0, 1.5, 30.0] {
                 let u = remaining(s, k);
-                assert!(u >= 0.0 && u < 1.0 + 1e-15, "{k} {s} {u}");
+                assert!((0.0..1.0 + 1e-15).contains(&u), "{k} {s} {u}");
                 if u > 1e-300 {
                     let residual = k * ln(u) + u - 1.0 + s;
                     // Two roundings of u, seen through the equation's slope, and those of the terms.
