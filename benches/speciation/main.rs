@@ -1,5 +1,7 @@
 //! Speciation of the carbonate system, one core: cold, and warm from totals that differ by a per cent.
 
+#![allow(clippy::print_stdout)]
+
 use lamella::chemistry::equilibrium::{Speciation, Totals};
 use lamella::maths::wide::Width;
 use lamella::plan::chemistry::{Activity, Equilibrium, Mineral, Primary, Secondary};
