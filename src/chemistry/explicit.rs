@@ -62,6 +62,10 @@ impl Stepper for Explicit<'_> {
         5.0
     }
 
+    fn local_share(&self) -> f64 {
+        0.5
+    }
+
     fn work(&self) -> (u64, u64) {
         (STAGES as u64, 0)
     }

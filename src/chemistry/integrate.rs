@@ -12,10 +12,6 @@ use crate::maths::vector;
 use crate::maths::wide::Width;
 use pulp::NullaryFnOnce;
 
-/// The local error is held to this share of the tolerance, so that errors that add up or grow stay within
-/// ten tolerances.
-const LOCAL_SHARE: f64 = 0.5;
-
 /// A lane without a particle.
 const IDLE: u32 = u32::MAX;
 
@@ -25,6 +21,9 @@ pub(super) trait Stepper {
     const MOST_STEPS: u32;
     /// Order of the error estimate plus 1.
     fn exponent(&self) -> f64;
+    /// The share of the tolerance that the error of one step may have, so that errors that add up or grow
+    /// stay within ten tolerances.
+    fn local_share(&self) -> f64;
     /// Evaluations of rates and factored matrices per attempt.
     fn work(&self) -> (u64, u64);
     /// Whatever depends on the state alone; leaves `dy/dt` in `slopes`.
@@ -160,7 +159,7 @@ impl<S: Stepper> NullaryFnOnce for Run<'_, '_, '_, '_, S> {
             stepper.begin(lanes);
             choose_steps(network, lanes, task.dt);
             stepper.attempt(lanes);
-            let judged = judge(network, lanes, stepper.exponent());
+            let judged = judge(network, lanes, stepper.exponent(), stepper.local_share());
             for l in 0..LANES {
                 if lanes.particle[l] != IDLE {
                     conclude::<S>(network, lanes, task, l, &judged);
@@ -237,7 +236,7 @@ struct Judged {
 }
 
 #[inline(always)]
-fn judge(network: &Network, lanes: &mut Lanes, exponent: f64) -> Judged {
+fn judge(network: &Network, lanes: &mut Lanes, exponent: f64, local_share: f64) -> Judged {
     let n = network.system.n_components;
     let (mut sum, mut is_positive) = ([0.0; LANES], [1.0; LANES]);
     for i in 0..n {
@@ -247,7 +246,7 @@ fn judge(network: &Network, lanes: &mut Lanes, exponent: f64) -> Judged {
             let (old, new) = (lanes.y[i][l].abs(), lanes.new[i][l].abs());
             let larger = if old > new { old } else { new };
             // Not `max`: NaN must come through.
-            let share = lanes.error[i][l] / (LOCAL_SHARE * (small + network.tolerance * larger));
+            let share = lanes.error[i][l] / (local_share * (small + network.tolerance * larger));
             let broken = lanes.new[i][l] * 0.0;
             sum[l] += share * share + broken;
             is_positive[l] = if lanes.new[i][l] < lowest { 0.0 } else { is_positive[l] };

@@ -13,6 +13,8 @@ mod invariants;
 pub mod laws;
 mod matrix;
 mod observed;
+#[cfg(test)]
+mod orders;
 mod reactor;
 mod rosenbrock;
 

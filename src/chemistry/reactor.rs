@@ -11,7 +11,7 @@ use super::closed::zero::Zero;
 use super::explicit::Explicit;
 use super::integrate::{Lanes, Network, Task, integrate};
 use super::invariants::Invariants;
-use super::laws::{Basis, Linear, System};
+use super::laws::{Basis, System};
 use super::matrix::Symbolic;
 use super::rosenbrock::{RODAS3, RODAS4, Rosenbrock};
 use crate::maths::wide::Width;
@@ -294,12 +294,14 @@ impl Integrator {
         let system = || System::new(kinetics, &plan.species, n, Basis::Components, &small);
         Ok(match kinetics.method {
             Method::Observed | Method::Exponential => {
-                let linear = match linear_of_mass_action(kinetics, &plan.species, n) {
-                    Some(linear) => Some(linear),
-                    None => system()?.linear,
-                };
-                let linear = linear.ok_or("the network is not of first order")?;
-                Self::Exponential(Exponential::new(n, linear.matrix, linear.constant))
+                let known = Exponential::of_mass_action(kinetics, &plan.species, n);
+                Self::Exponential(match known {
+                    Some(network) => network,
+                    None => {
+                        let linear = system()?.linear.ok_or("the network is not of first order")?;
+                        Exponential::new(n, &linear.matrix, &linear.constant)
+                    }
+                })
             }
             Method::Pair => Self::Pair(Pair::new(single()?, &plan.species)?),
             Method::Saturation => Self::Saturation(Saturation::new(single()?, &plan.species)?),
@@ -365,29 +367,6 @@ fn check_indices(plan: &Plan, kinetics: &Kinetics) -> Result<(), String> {
         return Err("a rate stands in no register".to_owned());
     }
     Ok(())
-}
-
-/// The matrix of a network whose laws are all mass action of order one or zero, from the laws themselves:
-/// what species are as sums of components may then be negative.
-fn linear_of_mass_action(kinetics: &Kinetics, species: &[Species], n: usize) -> Option<Linear> {
-    let (mut matrix, mut constant) = (vec![0.0; n * n], vec![0.0; n]);
-    for reaction in &kinetics.reactions {
-        let Law::MassAction { constant: rate, orders } = &reaction.law else { return None };
-        for &(row, coefficient) in &reaction.changes {
-            match orders[..] {
-                [] if coefficient * rate >= 0.0 => constant[row] += coefficient * rate,
-                [(index, 1.0)] => {
-                    let recipe = &species[index];
-                    constant[row] += coefficient * rate * recipe.constant;
-                    for &(column, factor) in &recipe.terms {
-                        matrix[row * n + column] += coefficient * rate * factor;
-                    }
-                }
-                _ => return None,
-            }
-        }
-    }
-    Some(Linear { matrix, constant })
 }
 
 fn check_finite(components: &[&mut [f64]]) -> Result<(), Failure> {

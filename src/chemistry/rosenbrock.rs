@@ -25,6 +25,7 @@ pub(super) struct Tableau<const S: usize> {
     is_new: [bool; S],
     /// Order of the estimate plus 1.
     exponent: u32,
+    local_share: f64,
 }
 
 /// Rodas3: order 3(2), stiffly accurate.
@@ -40,6 +41,7 @@ pub(super) const RODAS3: Tableau<4> = Tableau {
     gammas: [0.5, 1.5, 0.0, 0.0],
     is_new: [false, false, true, true],
     exponent: 3,
+    local_share: 0.25,
 };
 
 const A5: [f64; 4] =
@@ -87,6 +89,7 @@ pub(super) const RODAS4: Tableau<6> = Tableau {
     gammas: [0.25, -0.1043, 0.1035, -0.036_200_000_000_000_23, 0.0, 0.0],
     is_new: [false, true, true, true, true, true],
     exponent: 4,
+    local_share: 1.0,
 };
 
 /// A method for a network.
@@ -104,6 +107,10 @@ impl<const S: usize> Stepper for Rosenbrock<'_, S> {
 
     fn exponent(&self) -> f64 {
         f64::from(self.tableau.exponent)
+    }
+
+    fn local_share(&self) -> f64 {
+        self.tableau.local_share
     }
 
     fn work(&self) -> (u64, u64) {

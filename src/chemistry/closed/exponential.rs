@@ -5,6 +5,8 @@
 
 use crate::chemistry::reactor::Propagator;
 use crate::maths::wide::Width;
+use crate::plan::Species;
+use crate::plan::chemistry::{Kinetics, Law};
 use pulp::NullaryFnOnce;
 
 /// A number as the sum of two; right to about 1e-32.
@@ -83,9 +85,9 @@ fn multiply(n: usize, a: &[Double], b: &[Double], out: &mut [Double]) {
 /// Source: J. Xue and Q. Ye 2008, Numer. Math. 110, 393, doi:10.1007/s00211-008-0167-8 (shift); doublings
 /// multiply the relative error 1e-32 by 2^s.
 /// Shape: a relaxation.
-fn exponential(n: usize, matrix: &[f64], t: f64) -> Vec<f64> {
+fn exponential(n: usize, matrix: &[Double], t: f64) -> Vec<f64> {
     let norm = (0..n)
-        .map(|j| (0..n).map(|i| (matrix[i * n + j] * t).abs()).sum::<f64>())
+        .map(|j| (0..n).map(|i| (matrix[i * n + j].0 * t).abs()).sum::<f64>())
         .fold(0.0_f64, |largest, sum| if sum > largest || sum.is_nan() { sum } else { largest });
     if !norm.is_finite() {
         return vec![f64::NAN; n * n];
@@ -98,8 +100,8 @@ fn exponential(n: usize, matrix: &[f64], t: f64) -> Vec<f64> {
     }
     let mut inner: Vec<Double> = matrix
         .iter()
-        .map(|&entry| Double::product(entry, t))
-        .map(|Double(a, b)| Double(a * scale, b * scale))
+        .map(|entry| entry.multiply(Double(t, 0.0)))
+        .map(|Double(high, low)| Double(high * scale, low * scale))
         .collect();
     let shift = (0..n).map(|i| -inner[i * n + i].0).fold(0.0_f64, f64::max);
     (0..n).for_each(|i| inner[i * n + i] = inner[i * n + i].add(Double(shift, 0.0)));
@@ -131,26 +133,54 @@ fn exponential_of(x: f64) -> Double {
     sum
 }
 
-/// A first-order network `dy/dt = M y + b`.
+/// A first-order network `dy/dt = M y + b`. What leaves one component and enters another must cancel to
+/// the last digit, or fast reversible reactions would make mass: sums are kept twice as precise.
 #[derive(Debug, Clone)]
 pub(in crate::chemistry) struct Exponential {
     n: usize,
-    matrix: Vec<f64>,
-    constant: Vec<f64>,
+    matrix: Vec<Double>,
+    constant: Vec<Double>,
 }
 
 impl Exponential {
-    pub fn new(n: usize, matrix: Vec<f64>, constant: Vec<f64>) -> Self {
-        Self { n, matrix, constant }
+    pub fn new(n: usize, matrix: &[f64], constant: &[f64]) -> Self {
+        let precise = |values: &[f64]| values.iter().map(|&value| Double(value, 0.0)).collect();
+        Self { n, matrix: precise(matrix), constant: precise(constant) }
+    }
+
+    /// A network whose laws are all mass action of order one or zero, from the laws themselves: what
+    /// species are as sums of components may then be negative. `None` for other networks.
+    pub fn of_mass_action(kinetics: &Kinetics, species: &[Species], n: usize) -> Option<Self> {
+        let mut network = Self::new(n, &vec![0.0; n * n], &vec![0.0; n]);
+        for reaction in &kinetics.reactions {
+            let Law::MassAction { constant: rate, orders } = &reaction.law else { return None };
+            for &(row, coefficient) in &reaction.changes {
+                let flux = Double::product(coefficient, *rate);
+                match orders[..] {
+                    [] if flux.0 >= 0.0 => network.constant[row] = network.constant[row].add(flux),
+                    [(index, 1.0)] => {
+                        let recipe = &species[index];
+                        let constant = flux.multiply(Double(recipe.constant, 0.0));
+                        network.constant[row] = network.constant[row].add(constant);
+                        for &(column, factor) in &recipe.terms {
+                            let entry = &mut network.matrix[row * n + column];
+                            *entry = entry.add(flux.multiply(Double(factor, 0.0)));
+                        }
+                    }
+                    _ => return None,
+                }
+            }
+        }
+        Some(network)
     }
 
     /// Over a time; a constant production is one more component that stays 1.
     pub fn propagator(&self, t: f64) -> Propagator {
         let n = self.n;
-        if self.constant.iter().all(|&entry| entry == 0.0) {
+        if self.constant.iter().all(|entry| entry.0 == 0.0) {
             return Propagator { matrix: exponential(n, &self.matrix, t), constant: vec![0.0; n] };
         }
-        let mut augmented = vec![0.0; (n + 1) * (n + 1)];
+        let mut augmented = vec![Double::default(); (n + 1) * (n + 1)];
         for i in 0..n {
             augmented[i * (n + 1)..i * (n + 1) + n].copy_from_slice(&self.matrix[i * n..(i + 1) * n]);
             augmented[i * (n + 1) + n] = self.constant[i];
@@ -218,6 +248,7 @@ impl NullaryFnOnce for Apply<'_, '_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plan::chemistry::{Kinetic, Laws, Method};
 
     fn close(found: &[f64], right: &[f64], relative: f64) {
         for (found, right) in found.iter().zip(right) {
@@ -228,7 +259,7 @@ mod tests {
     /// Decay chain A → B → C with rates 0.6 and 0.3 over 2: the closed form of Bateman.
     #[test]
     fn a_chain_is_batemans() {
-        let chain = Exponential::new(3, vec![-0.6, 0.0, 0.0, 0.6, -0.3, 0.0, 0.0, 0.3, 0.0], vec![0.0; 3]);
+        let chain = Exponential::new(3, &[-0.6, 0.0, 0.0, 0.6, -0.3, 0.0, 0.0, 0.3, 0.0], &[0.0; 3]);
         let (a, b) = (0.301_194_211_912_202_1, 0.548_811_636_094_026_4);
         let produced = 0.6 / 0.3 * (b - a);
         let right = [a, 0.0, 0.0, produced, b, 0.0, 1.0 - a - produced, 1.0 - b, 1.0];
@@ -239,10 +270,28 @@ mod tests {
     /// as right as the fast one. A ⇌ B fast, B → C slow: eigenvalues of [[−f, f], [f, −f − s]].
     #[test]
     fn stiff_networks_keep_their_sums() {
+        let (fast, slow) = (1e9, 1e-3);
+        let reaction = |from: usize, to: usize, constant: f64| Kinetic {
+            name: String::new(),
+            changes: vec![(from, -1.0), (to, 1.0)],
+            law: Law::MassAction { constant, orders: vec![(from, 1.0)] },
+        };
+        let kinetics = Kinetics {
+            reactions: vec![reaction(0, 1, fast), reaction(1, 0, fast), reaction(1, 2, slow)],
+            laws: Laws { operations: vec![], rates: vec![] },
+            method: Method::Exponential,
+        };
+        let species: Vec<Species> = (0..3)
+            .map(|idx| Species {
+                name: String::new(),
+                constant: 0.0,
+                terms: vec![(idx, 1.0)],
+                is_molar: true,
+            })
+            .collect();
+        let network = Exponential::of_mass_action(&kinetics, &species, 3).unwrap();
         for t in [1e-12, 1e-3, 1.0, 1e3, 1e12] {
-            let (fast, slow) = (1e9, 1e-3);
-            let matrix = vec![-fast, fast, 0.0, fast, -fast - slow, 0.0, 0.0, slow, 0.0];
-            let p = Exponential::new(3, matrix, vec![0.0; 3]).propagator(t).matrix;
+            let p = network.propagator(t).matrix;
             assert!(p.iter().all(|&entry| entry >= 0.0), "{t}: {p:?}");
             for j in 0..3 {
                 let sum = p[j] + p[3 + j] + p[6 + j];
@@ -259,14 +308,14 @@ mod tests {
     /// A → nothing with a rate of 1 beside a rate of 1e12.
     #[test]
     fn fast_neighbours_cost_no_digits() {
-        let p = Exponential::new(2, vec![-1e12, 0.0, 0.0, -1.0], vec![0.0; 2]).propagator(3.0).matrix;
+        let p = Exponential::new(2, &[-1e12, 0.0, 0.0, -1.0], &[0.0; 2]).propagator(3.0).matrix;
         close(&p, &[0.0, 0.0, 0.0, 0.049_787_068_367_863_944], 1e-15);
     }
 
     /// dy/dt = b − k y: y = y₀ e^{−kt} + (b/k)(1 − e^{−kt}).
     #[test]
     fn production_is_added() {
-        let p = Exponential::new(1, vec![-2.0], vec![3.0]).propagator(0.7);
+        let p = Exponential::new(1, &[-2.0], &[3.0]).propagator(0.7);
         let decay = 0.246_596_963_941_606_5;
         close(&p.matrix, &[decay], 1e-15);
         close(&p.constant, &[1.5 * (1.0 - decay)], 1e-15);

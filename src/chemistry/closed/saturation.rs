@@ -120,7 +120,7 @@ fn depletion(v: f64, t: f64, half: f64, c: &mut [f64; BLOCK], gone: &mut [f64; B
 /// The positive solution of `ω + ln ω = u`: Lambert's `W₀(e^u)` without overflow.
 ///
 /// Equation: two steps of Fritsch, Shafer and Crowley from a guess.
-/// Symbols: `z = u − ω − ln ω`, `q = 2 (1 + ω)(1 + ω + ⅔ z)`, `ω ← ω (1 + z/(1 + ω) (q − z)/(q − 2z))`.
+/// Symbols: `z = u − ω − ln ω`, `p = z/(1 + ω)`, `q = 2 (1 + ω + ⅔ z)`, `ω ← ω (1 + p (q − p)/(q − 2p))`.
 /// Dimensions and range: any u; `e^u` far below, `u − ln u` far above.
 /// Source: F. N. Fritsch, R. E. Shafer and W. P. Crowley 1973, Comm. ACM 16, 123, doi:10.1145/361952.361970.
 /// Shape: e^u that bends into a straight line.
@@ -134,8 +134,9 @@ fn omega(u: f64) -> f64 {
     for _ in 0..3 {
         let z = (u - w) - vector::ln(w);
         let more = 1.0 + w;
-        let q = 2.0 * more * (more + z * (2.0 / 3.0));
-        w *= 1.0 + z / more * (q - z) / (q - 2.0 * z);
+        let p = z / more;
+        let q = 2.0 * (more + z * (2.0 / 3.0));
+        w *= 1.0 + p * (q - p) / (q - 2.0 * p);
     }
     if u < -40.0 { power } else { w }
 }
