@@ -9,6 +9,7 @@ use crate::maths::operator::{Binary, Unary};
 use crate::source::Span;
 use crate::syntax::tree::{self, BinaryOperator, ExprKind, UnaryOperator};
 use crate::units::Dimension;
+use std::collections::BTreeMap;
 
 /// Nodes that one expression may have after functions are put in.
 const MAX_EXPRESSION_SIZE: u32 = 50_000;
@@ -52,6 +53,8 @@ pub(super) struct Checker<'a> {
     pub(super) call_stack: Vec<Call>,
     /// What a measure may speak of, while measures are checked.
     pub(super) measuring: Option<Measuring>,
+    /// The whole expressions of the scene that have been checked, by their places.
+    pub(super) checked: BTreeMap<Span, &'a tree::Expr>,
     /// Constants whose values are being worked out, each for the one before it.
     pub(super) running: Vec<String>,
 }
@@ -70,6 +73,7 @@ impl<'a> Checker<'a> {
 
     /// Checks an expression; `None` means that its mistake has been reported.
     pub(super) fn check(&mut self, expr: &'a tree::Expr, allow: Allow) -> Option<Expr> {
+        self.checked.insert(expr.span, expr);
         self.check_with(expr, allow, &Vec::new())
     }
 

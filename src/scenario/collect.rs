@@ -2,10 +2,10 @@
 
 use super::check::Checker;
 use super::expression::Type;
-use super::scope::{Origin, Progress, Scope};
+use super::scope::{Origin, Scope};
 use super::settings::{check_setting, read_settings, unit_as_written};
 use super::{Parameter, Scenario, Settings};
-use crate::diagnostic::codes::{D001, D010, M001, M002, M018, P002};
+use crate::diagnostic::codes::{D001, M001, M002, M018, P002};
 use crate::diagnostic::{Diagnostic, precise};
 use crate::source::{Sources, Span};
 use crate::syntax::tree::{self, StatementKind};
@@ -70,6 +70,7 @@ pub fn resolve(
         is_initial_wrong: false,
         call_stack: Vec::new(),
         measuring: None,
+        checked: Default::default(),
         running: Vec::new(),
     };
     define_names(&mut checker, &statements, &overrides);
@@ -78,7 +79,8 @@ pub fn resolve(
     let mut diagnostics = std::mem::take(&mut checker.diagnostics);
     if !has_syntax_errors {
         checker.scope.report_undefined(&axes, &mut diagnostics);
-        report_unused(&checker.scope, &mut diagnostics);
+        super::unused::report_unused(&checker.scope, &mut diagnostics);
+        super::settings::name_settings(&checker, &mut diagnostics);
     }
     let diagnostics = in_order(diagnostics, has_syntax_errors);
     let is_fatal = has_syntax_errors || crate::diagnostic::any_fatal(&diagnostics);
@@ -371,17 +373,4 @@ fn parameters<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> Vec
         });
     }
     list
-}
-
-fn report_unused(scope: &Scope<'_>, diagnostics: &mut Vec<Diagnostic>) {
-    for (name, entry) in scope.iter() {
-        let is_constant = matches!(entry.origin, Origin::Let(_) | Origin::Param(_) | Origin::Function(_));
-        if is_constant && entry.n_uses == 0 && !matches!(entry.progress, Progress::Wrong) {
-            diagnostics.push(
-                Diagnostic::warning(D010, format!("`{name}` is never used"))
-                    .at(entry.span, format!("{} without effect", entry.origin.describe()))
-                    .help("delete it, or use it"),
-            );
-        }
-    }
 }

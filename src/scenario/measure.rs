@@ -13,13 +13,14 @@ use super::places::Results;
 use super::restriction::check_restrictions;
 use super::results::Measuring;
 use super::scope::Origin;
+use super::slot::each_name;
 use super::{Domain, Measure, Output, OutputKind, Reference};
 use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{D006, U108};
 use crate::maths::operator::{Binary, Unary};
 use crate::maths::order::order;
 use crate::source::Span;
-use crate::syntax::tree::{self, ExprKind};
+use crate::syntax::tree;
 use crate::units::Dimension;
 use serde::{Deserialize, Serialize};
 use std::rc::Rc;
@@ -145,14 +146,17 @@ fn needs(checker: &Checker<'_>, expr: &tree::Expr) -> Vec<usize> {
     let mut n_seen = 0;
     let (mut body, mut parameters): (&tree::Expr, &[tree::Name]) = (expr, &[]);
     loop {
-        each_name(body, &mut |name| match checker.scope.get(&name.value).map(|entry| entry.origin) {
+        each_name(body, &mut |name, is_called| {
+            let origin = checker.scope.get(&name.value).map(|entry| entry.origin);
             // A parameter of the function hides a measure.
-            _ if parameters.iter().any(|parameter| parameter.value == name.value) => {}
-            Some(Origin::Measure(idx)) => needs.push(idx),
-            Some(Origin::Function(function)) if !called.iter().any(|it| std::ptr::eq(*it, function)) => {
-                called.push(function);
+            let is_hidden = || parameters.iter().any(|parameter| parameter.value == name.value);
+            match origin {
+                Some(Origin::Measure(idx)) if !is_called && !is_hidden() => needs.push(idx),
+                Some(Origin::Function(it)) if is_called && !called.iter().any(|is| std::ptr::eq(*is, it)) => {
+                    called.push(it);
+                }
+                _ => {}
             }
-            _ => {}
         });
         let Some(function) = called.get(n_seen) else { break };
         (body, parameters) = (&function.body, &function.parameters);
@@ -161,33 +165,6 @@ fn needs(checker: &Checker<'_>, expr: &tree::Expr) -> Vec<usize> {
     needs.sort_unstable();
     needs.dedup();
     needs
-}
-
-/// Names that stand alone, and those of functions.
-fn each_name<'t>(expr: &'t tree::Expr, visit: &mut impl FnMut(&'t tree::Name)) {
-    match &expr.kind {
-        ExprKind::Number(_) => {}
-        ExprKind::Path(path) => {
-            if let [name] = path.as_slice() {
-                visit(name);
-            }
-        }
-        ExprKind::Call { function, arguments } => {
-            visit(function);
-            arguments.iter().for_each(|argument| each_name(&argument.value, visit));
-        }
-        ExprKind::Unary { operand, .. } => each_name(operand, visit),
-        ExprKind::Binary { left, right, .. } => {
-            each_name(left, visit);
-            each_name(right, visit);
-        }
-        ExprKind::If { condition, then, otherwise } => {
-            each_name(condition, visit);
-            each_name(then, visit);
-            each_name(otherwise, visit);
-        }
-        ExprKind::Tuple(parts) => parts.iter().for_each(|part| each_name(part, visit)),
-    }
 }
 
 fn measure<'a>(

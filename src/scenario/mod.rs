@@ -29,6 +29,7 @@ mod scope;
 mod settings;
 mod slot;
 pub mod sweep;
+mod unused;
 mod used;
 mod zones;
 

@@ -7,11 +7,13 @@ use super::Settings;
 use super::check::{Allow, Checker};
 use super::expression::Type;
 use super::scope::Origin;
+use super::slot::each_name;
 use super::sweep::Target;
-use crate::diagnostic::codes::{P001, S010, U104};
-use crate::diagnostic::{Diagnostic, did_you_mean};
+use crate::diagnostic::codes::{M005, P001, S010, U104};
+use crate::diagnostic::{Diagnostic, Label, did_you_mean};
 use crate::source::{Sources, Span};
 use crate::syntax::tree::{self, ExprKind, StatementKind, UnaryOperator};
+use std::collections::BTreeSet;
 
 /// Each setting is a source of its own, and sources are counted in 16 bits.
 const MAX_SETTINGS: usize = 10_000;
@@ -145,6 +147,37 @@ pub(super) fn check_setting<'a>(checker: &mut Checker<'a>, written: &'a tree::Pa
             .found(kind.describe())
             .expected(own.kind.describe()),
         );
+    }
+}
+
+/// Adds the settings of the command line to what is told of a value that follows from them.
+pub(super) fn name_settings(checker: &Checker<'_>, diagnostics: &mut [Diagnostic]) {
+    for message in diagnostics.iter_mut().filter(|message| message.code == M005) {
+        let Some(expr) = message.primary_span().and_then(|span| checker.checked.get(&span)) else { continue };
+        let mut settings = Vec::new();
+        let (mut open, mut seen) = (vec![*expr], BTreeSet::new());
+        while let Some(expr) = open.pop() {
+            each_name(expr, &mut |name, _| {
+                let entry = checker.scope.get(&name.value).filter(|_| seen.insert(name.value.as_str()));
+                match entry.map(|entry| (entry.origin, entry.span)) {
+                    Some((Origin::Let(it), _)) => open.push(&it.value),
+                    Some((Origin::Param(it), own)) if it.value.span.file != own.file => {
+                        settings.push((it.value.span, &it.name.value));
+                    }
+                    Some((Origin::Param(it), _)) => open.push(&it.value),
+                    _ => {}
+                }
+            });
+        }
+        settings.sort();
+        let is_new = |span: &Span| message.labels.iter().all(|label| label.span != *span);
+        let labels = settings.into_iter().filter(|(span, _)| is_new(span)).map(|(span, name)| Label {
+            span,
+            text: format!("`{name}` is set here"),
+            is_primary: false,
+        });
+        let labels: Vec<Label> = labels.collect();
+        message.labels.extend(labels);
     }
 }
 

@@ -240,26 +240,36 @@ fn unit_of(expr: &tree::Expr) -> Option<&crate::source::Spanned<String>> {
 
 /// Single names in an expression, each once per use.
 pub(super) fn collect_names(expr: &tree::Expr, names: &mut Vec<String>) {
+    each_name(expr, &mut |name, is_called| {
+        if !is_called {
+            names.push(name.value.clone());
+        }
+    });
+}
+
+/// Names that stand alone, and with `true` those of functions that are called.
+pub(super) fn each_name<'t>(expr: &'t tree::Expr, visit: &mut impl FnMut(&'t tree::Name, bool)) {
     match &expr.kind {
         ExprKind::Number(_) => {}
         ExprKind::Path(path) => {
             if let [name] = path.as_slice() {
-                names.push(name.value.clone());
+                visit(name, false);
             }
         }
-        ExprKind::Call { arguments, .. } => {
-            arguments.iter().for_each(|argument| collect_names(&argument.value, names));
+        ExprKind::Call { function, arguments } => {
+            visit(function, true);
+            arguments.iter().for_each(|argument| each_name(&argument.value, visit));
         }
-        ExprKind::Unary { operand, .. } => collect_names(operand, names),
+        ExprKind::Unary { operand, .. } => each_name(operand, visit),
         ExprKind::Binary { left, right, .. } => {
-            collect_names(left, names);
-            collect_names(right, names);
+            each_name(left, visit);
+            each_name(right, visit);
         }
         ExprKind::If { condition, then, otherwise } => {
-            collect_names(condition, names);
-            collect_names(then, names);
-            collect_names(otherwise, names);
+            each_name(condition, visit);
+            each_name(then, visit);
+            each_name(otherwise, visit);
         }
-        ExprKind::Tuple(parts) => parts.iter().for_each(|part| collect_names(part, names)),
+        ExprKind::Tuple(parts) => parts.iter().for_each(|part| each_name(part, visit)),
     }
 }

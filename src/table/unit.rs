@@ -19,7 +19,7 @@ pub struct ValueUnit {
 const SYMBOLS: [(usize, &str); 7] =
     [(1, "kg"), (3, "mol"), (0, "m"), (2, "s"), (4, "K"), (5, "A"), (6, "cd")];
 
-/// A dimension as a product of SI base units, `mol/m^3` or `1`.
+/// A dimension as a product of SI base units, `kg·mol/m^6` or `1`, as scenes write them.
 pub fn si_text(dimension: Dimension) -> String {
     let part = |sign: i16| {
         SYMBOLS
@@ -29,12 +29,9 @@ pub fn si_text(dimension: Dimension) -> String {
             .collect::<Vec<_>>()
     };
     let (above, below) = (part(1), part(-1));
-    let above = if above.is_empty() { "1".to_owned() } else { above.join(" ") };
-    match below.len() {
-        0 => above,
-        1 => format!("{above}/{}", below[0]),
-        _ => format!("{above}/({})", below.join(" ")),
-    }
+    let above = if above.is_empty() { "1".to_owned() } else { above.join("·") };
+    let below: String = below.iter().map(|factor| format!("/{factor}")).collect();
+    format!("{above}{below}")
 }
 
 fn power(symbol: &str, sixtieths: i16) -> String {
@@ -97,20 +94,21 @@ pub fn dimension_of(text: &str) -> Option<Dimension> {
     Unit::parse(text).ok().map(|unit| unit.dimension).or_else(|| of_si_text(text))
 }
 
-/// The way back from [`si_text`].
+/// The way back from [`si_text`], and from `kg mol/(m^3 s)` as tables of earlier versions have it.
 fn of_si_text(text: &str) -> Option<Dimension> {
     let (above, below) = text.split_once('/').unwrap_or((text, ""));
     let below = below.strip_prefix('(').map_or(below, |rest| rest.trim_end_matches(')'));
     if above.is_empty() {
         return None;
     }
+    let factors = |part: &'_ str| part.split([' ', '·', '/']).map(str::to_owned).collect::<Vec<_>>();
+    let signed = factors(above).into_iter().map(|factor| (factor, 1.0));
     let mut dimension = Dimension::NONE;
-    let signed = above.split_whitespace().map(|factor| (factor, 1.0));
-    for (factor, sign) in signed.chain(below.split_whitespace().map(|factor| (factor, -1.0))) {
-        if factor == "1" {
+    for (factor, sign) in signed.chain(factors(below).into_iter().map(|factor| (factor, -1.0))) {
+        if factor == "1" || factor.is_empty() {
             continue;
         }
-        let (symbol, exponent) = factor.split_once('^').unwrap_or((factor, "1"));
+        let (symbol, exponent) = factor.split_once('^').unwrap_or((&factor, "1"));
         let (idx, _) = SYMBOLS.iter().find(|(_, known)| *known == symbol)?;
         let sixtieths = exponent.parse::<f64>().ok()? * f64::from(SCALE);
         dimension.0[*idx] += (sign * sixtieths).round() as i16;
@@ -140,9 +138,9 @@ mod tests {
         assert_eq!(text(-2, 1, 0, 0), "kg/m^2");
         assert_eq!(text(0, 0, 0, 0), "1");
         assert_eq!(text(0, 0, -1, 0), "1/s");
-        assert_eq!(text(-5, 1, 0, 1), "kg mol/m^5");
+        assert_eq!(text(-5, 1, 0, 1), "kg·mol/m^5");
         assert_eq!(text(2, 0, -1, 0), "m^2/s");
-        assert_eq!(text(-3, 0, -1, 1), "mol/(m^3 s)");
+        assert_eq!(text(-3, 0, -1, 1), "mol/m^3/s");
         assert_eq!(si_text(Dimension([SCALE / 2, 0, 0, 0, 0, 0, 0])), "m^0.5");
     }
 
@@ -154,6 +152,12 @@ mod tests {
                 assert_eq!(dimension_of(&si_text(dimension)), Some(dimension), "{}", si_text(dimension));
             }
         }
+        let rate = Dimension::new(-3, 1, -1, 1);
+        for text in ["kg·mol/m^3/s", "kg mol/(m^3 s)"] {
+            assert_eq!(dimension_of(text), Some(rate));
+        }
+        // A scene can ask for it: `in kg·mol/m^6`.
+        assert_eq!(Unit::parse(&si_text(rate)).map(|unit| unit.dimension), Ok(rate));
         assert_eq!(dimension_of("mg/L"), Some(Dimension::MASS_CONCENTRATION));
         for text in ["byte", "UTC", "", "m^", "see column unit"] {
             assert_eq!(dimension_of(text), None, "{text}");
