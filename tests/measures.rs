@@ -22,6 +22,11 @@ fn measures(rest: &str) -> Vec<f64> {
 }
 
 fn measures_of(scene: &str) -> Vec<f64> {
+    run(scene).0
+}
+
+/// The measures of a scene, and the sub-steps that the engine counted.
+fn run(scene: &str) -> (Vec<f64>, Option<u64>) {
     let settings = lamella::scenario::Settings::default();
     let checked = lamella::check(Sources::single("scene.lam", scene), &settings, &Options::default());
     let compiled = checked.compiled.unwrap_or_else(|| panic!("{:#?}", checked.diagnostics));
@@ -33,7 +38,8 @@ fn measures_of(scene: &str) -> Vec<f64> {
     let outcome =
         engine::run(&compiled.plan, &Settings::default(), &Unattended, &mut sink).expect("the scene runs");
     let found = measure::evaluate(&compiled.plan, &compiled.evaluation, &snapshots, &outcome);
-    found.expect("has values").measures.iter().map(|measure| measure.value).collect()
+    let values = found.expect("has values").measures.iter().map(|measure| measure.value).collect();
+    (values, outcome.sub_steps())
 }
 
 fn assert_close(found: &[f64], expected: &[f64]) {
@@ -214,6 +220,25 @@ measure on_profile = l1(g) * relative(g, profile.T)
 ",
     );
     assert_close(&measures, &[0.6, 20.0 * 1.5]);
+}
+
+/// A decay of 2 per run that is integrated: at least one sub-step for each particle and step.
+#[test]
+fn sub_steps_are_those_of_the_engine() {
+    let rest = "chemistry integrator explicit
+reaction decay: T -> other @ 1 /s
+output total T at t = 0 s, 2 s
+measure each  = sub_steps / (particles * steps)
+measure work  = sub_steps
+measure loss  = ln(before / after)
+measure before = maximum(total.T) at t = 0 s
+measure after  = maximum(total.T) at t = 2 s
+";
+    let (measures, sub_steps) = run(&format!("{SCENE}{rest}"));
+    assert_eq!(sub_steps.map(|n| n as f64), Some(measures[1]));
+    assert!(measures[0] >= 1.0 && measures[0] == measures[1] / 2000.0, "{measures:?}");
+    // The tolerance of the integrator, 1e-6 of each sub-step, gathers over a few of them.
+    assert!((measures[2] - 2.0).abs() < 1e-5, "{measures:?}");
 }
 
 /// Nothing is integrated in these scenes.
