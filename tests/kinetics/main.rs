@@ -2,6 +2,7 @@
 
 mod closed;
 mod exhausted;
+mod jacobian;
 mod network;
 mod stiff;
 #[path = "../support/mod.rs"]

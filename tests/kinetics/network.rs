@@ -53,10 +53,6 @@ impl Network {
         self.binary(Binary::Multiply, a, b)
     }
 
-    pub fn select(&mut self, condition: Register, a: Register, b: Register) -> Register {
-        self.push(Operation::Select(condition, a, b))
-    }
-
     /// `c/(K + c)`
     pub fn monod(&mut self, species: usize, half: f64) -> Register {
         let (c, half) = (self.c(species), self.k(half));

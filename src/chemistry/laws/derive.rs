@@ -111,9 +111,24 @@ fn binary_rule(graph: &mut Graph, binary: Binary, value: Id, [a, b]: [Id; 2], [d
         }
         Binary::Power => power_rule(graph, value, [a, b], [da, db]),
         Binary::Minimum | Binary::Maximum => {
-            let test = if binary == Binary::Minimum { Binary::LessEqual } else { Binary::GreaterEqual };
-            let is_first = graph.binary(test, a, b);
-            graph.select(is_first, da, db)
+            // Where both are equal the one that leads to larger arguments: the larger slope of a maximum.
+            let (or_equal, strictly) = match binary {
+                Binary::Minimum => (Binary::LessEqual, Binary::Less),
+                _ => (Binary::GreaterEqual, Binary::Greater),
+            };
+            let tied = graph.binary(binary, da, db);
+            if tied == da {
+                let is_first = graph.binary(or_equal, a, b);
+                return graph.select(is_first, da, db);
+            }
+            let otherwise = if tied == db {
+                db
+            } else {
+                let is_tied = graph.binary(Binary::Equal, a, b);
+                graph.select(is_tied, tied, db)
+            };
+            let is_first = graph.binary(strictly, a, b);
+            graph.select(is_first, da, otherwise)
         }
         _ => graph.constant(0.0),
     }
