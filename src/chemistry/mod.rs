@@ -16,7 +16,9 @@ mod observed;
 #[cfg(test)]
 mod orders;
 mod reactor;
+mod reversal;
 mod rosenbrock;
 
 pub use observed::Observed;
 pub use reactor::{Batch, Failure, Propagator, Reactor, Scratch, Why, Work};
+pub use reversal::Reversal;

@@ -115,13 +115,6 @@ impl<'a, const D: usize> Program<'a, D> {
         self.plan.chemistry.as_ref().is_some_and(|chemistry| chemistry.equilibrium.is_some())
     }
 
-    /// Sums per slot that a reaction leaves: one for each immobile component, then two per column if there
-    /// are zones, of its values and of those above zero.
-    pub fn n_reaction_sums(&self) -> usize {
-        let n_immobile = self.plan.components.len() - self.n_mobile;
-        n_immobile + if self.has_mixing() { 2 * self.n_columns() } else { 0 }
-    }
-
     /// Whether what a particle reacts with hangs on its bin: a mean, or what lives there.
     pub fn is_coupled(&self) -> bool {
         self.has_mixing() || self.plan.has_immobile()

@@ -9,7 +9,7 @@ use super::average::Means;
 use super::mix;
 use super::observe::lane_sum;
 use super::program::{Program, Term};
-use crate::chemistry::{Batch, Failure, Reactor, Scratch, Work as Labour};
+use crate::chemistry::{Batch, Failure, Reactor, Reversal, Scratch, Work as Labour};
 use crate::state::particles::CHUNK;
 
 /// A time over which particles react.
@@ -49,8 +49,6 @@ pub struct Bench {
     /// Of all chunks of a group.
     pub added: Vec<Added>,
     pub labour: Labour,
-    /// Per column, whether a value went below zero.
-    pub negative: Vec<bool>,
 }
 
 impl Bench {
@@ -63,8 +61,6 @@ impl Bench {
         self.added.clear();
         self.added.resize(n_components, Added::default());
         self.labour = Labour::default();
-        self.negative.clear();
-        self.negative.resize(program.n_columns(), false);
     }
 }
 
@@ -72,6 +68,7 @@ impl Bench {
 pub struct Reaction<'a, const D: usize> {
     pub program: &'a Program<'a, D>,
     pub reactor: &'a Reactor,
+    pub reversal: Option<&'a Reversal>,
     /// Over which the particles react, one after the other.
     pub spans: &'a [Span],
     pub means: &'a Means,
@@ -94,7 +91,7 @@ impl<const D: usize> Reaction<'_, D> {
     ///
     /// - Equation: `U = Σ_i η_i W_i`; `U → U'` by the laws; `W_i ← W_i + (U' − U)`.
     /// - Symbols: `W_i` the value of zone `i`, `η_i` its fraction, ū for an instant zone.
-    /// - Range: `U ≥ 0`; a zone may go below zero though the particle does not, see `repair`.
+    /// - Range: `U ≥ 0`, or what [`Reversal`] makes of it; a zone may be below zero though the particle is not.
     /// - Source: Sole-Mari et al. (2020): the same reaction in every zone; methods, sections 7.1 and 7.2.
     /// - Shape: columns of one chunk.
     pub fn react(&self, chunk: Chunk<'_, D>, bench: &mut Bench, sums: &mut [f64]) -> Result<(), Failure> {
@@ -105,6 +102,9 @@ impl<const D: usize> Reaction<'_, D> {
         self.gather(slots, columns, bench, n);
         for (before, values) in bench.before.iter_mut().zip(&bench.values) {
             before[..n].copy_from_slice(&values[..n]);
+        }
+        if let Some(reversal) = self.reversal {
+            reversal.apply(&mut bench.values, n);
         }
         let places = self.places(positions);
         let mut values: Vec<&mut [f64]> = bench.values.iter_mut().map(|column| &mut column[..n]).collect();
@@ -123,7 +123,7 @@ impl<const D: usize> Reaction<'_, D> {
             add_work(&mut bench.labour, &labour);
         }
         drop(values);
-        self.scatter(slots, columns, bench, sums, n);
+        self.scatter(slots, columns, bench, n);
         self.leave(slots, bench, sums, n);
         Ok(())
     }
@@ -204,18 +204,9 @@ impl<const D: usize> Reaction<'_, D> {
     }
 
     /// Adds what the reaction changed to every zone.
-    fn scatter(
-        &self,
-        slots: &[i32],
-        columns: &mut [&mut [f64]],
-        bench: &mut Bench,
-        sums: &mut [f64],
-        n: usize,
-    ) {
+    fn scatter(&self, slots: &[i32], columns: &mut [&mut [f64]], bench: &mut Bench, n: usize) {
         let program = self.program;
         let n_slots = program.roles.len();
-        let stride = program.n_reaction_sums();
-        let is_single = matches!(program.terms[..], [Term::Column { fraction: 1.0, .. }]);
         let n_bins = program.grid.n_bins() as i32;
         for component in 0..program.n_components() {
             let (after, before) = (&mut bench.values[component][..n], &bench.before[component][..n]);
@@ -233,23 +224,9 @@ impl<const D: usize> Reaction<'_, D> {
             }
             bench.added[component].add(added);
             let own = &mut columns[component * n_slots..][..n_slots];
-            if is_single {
-                own[0].copy_from_slice(after);
-                continue;
-            }
-            for (slot_idx, column) in own.iter_mut().enumerate() {
-                let mut n_below = 0_u32;
+            for column in own {
                 for idx in 0..n {
                     column[idx] += after[idx] - before[idx];
-                    n_below |= u32::from(column[idx] < 0.0);
-                }
-                let column_idx = component * n_slots + slot_idx;
-                bench.negative[column_idx] |= n_below != 0;
-                let place = self.immobile.len() + 2 * column_idx;
-                for idx in 0..n {
-                    let sum = &mut sums[slots[idx] as usize * stride + place..][..2];
-                    sum[0] += column[idx];
-                    sum[1] += column[idx].max(0.0);
                 }
             }
         }
@@ -258,13 +235,13 @@ impl<const D: usize> Reaction<'_, D> {
     /// Sums what becomes of the bins.
     fn leave(&self, slots: &[i32], bench: &mut Bench, sums: &mut [f64], n: usize) {
         let first = self.program.n_components();
-        let (n_immobile, stride) = (self.immobile.len(), self.program.n_reaction_sums());
+        let n_immobile = self.immobile.len();
         let (before, after) = (&bench.before[first..], &bench.values[first..]);
         for j in 0..n_immobile {
             let mut added = Added::default();
             for idx in 0..n {
                 let change = after[j][idx] - before[j][idx];
-                sums[slots[idx] as usize * stride + j] += change;
+                sums[slots[idx] as usize * n_immobile + j] += change;
                 added.sum += change;
                 added.size += change.abs();
             }

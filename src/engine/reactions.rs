@@ -11,7 +11,7 @@ use super::react::{Added, Bench, Reaction, Span, add_work};
 use super::run::Run;
 use super::schedule::{Due, step_length};
 use super::{initial, parallel};
-use crate::chemistry::{Batch, Observed, Reactor, Scratch, Why, Work as Labour};
+use crate::chemistry::{Batch, Observed, Reactor, Reversal, Scratch, Why, Work as Labour};
 use crate::diagnostic::precise;
 use crate::plan::Plan;
 use crate::plan::chemistry::Splitting;
@@ -23,6 +23,8 @@ pub struct Reactions {
     reactor: Option<Reactor>,
     observed: Option<Observed>,
     pub speciation: Option<Speciation>,
+    /// With zones: what is taken back where others have used up a mean.
+    pub reversal: Option<Reversal>,
     is_symmetric: bool,
     /// Over which the particles still have to react, at the positions that they have now.
     spans: Vec<Span>,
@@ -35,10 +37,6 @@ pub struct Reactions {
     pub added: Vec<Added>,
     /// Of everything that was integrated.
     pub labour: Labour,
-    /// Per column, whether a value went below zero in the last reaction.
-    negative: Vec<bool>,
-    /// Sums of the last reaction, as [`Program::n_reaction_sums`] says.
-    sums: Vec<f64>,
 }
 
 /// Equilibrium as observations see it.
@@ -88,14 +86,12 @@ impl Speciation {
 pub struct Yield {
     added: Vec<Added>,
     labour: Labour,
-    negative: Vec<bool>,
 }
 
 impl Yield {
     /// Takes what a thread has gathered.
     pub fn take(&mut self, bench: &mut Bench) {
         self.added.clone_from(&bench.added);
-        self.negative.clone_from(&bench.negative);
         self.labour = std::mem::take(&mut bench.labour);
     }
 }
@@ -118,6 +114,7 @@ impl Reactions {
             reactor,
             observed: Observed::new(plan).map_err(|what| unsound(&what))?,
             speciation: Speciation::new(plan).map_err(|what| unsound(&what))?,
+            reversal: Reversal::new(plan).filter(|_| program.has_mixing()),
             is_symmetric: splitting == Some(Splitting::Strang),
             spans: Vec::new(),
             step: Span { t: 0.0, dt: 0.0 },
@@ -125,8 +122,6 @@ impl Reactions {
             immobile,
             added: vec![Added::default(); plan.components.len()],
             labour: Labour::default(),
-            negative: Vec::new(),
-            sums: Vec::new(),
         })
     }
 
@@ -136,6 +131,7 @@ impl Reactions {
             reactor: self.reactor.clone(),
             observed: self.observed.clone(),
             speciation: self.speciation.clone(),
+            reversal: self.reversal.clone(),
             is_symmetric: self.is_symmetric,
             spans: self.spans.clone(),
             step: self.step,
@@ -143,8 +139,6 @@ impl Reactions {
             immobile_before: self.immobile_before.clone(),
             added: self.added.clone(),
             labour: Labour::default(),
-            negative: Vec::new(),
-            sums: Vec::new(),
         }
     }
 
@@ -177,24 +171,28 @@ impl Reactions {
         spans: &'a [Span],
     ) -> Option<Reaction<'a, D>> {
         let reactor = self.reactor.as_ref().filter(|_| !spans.is_empty())?;
-        Some(Reaction { program, reactor, spans, means, immobile: &self.immobile })
+        Some(Reaction {
+            program,
+            reactor,
+            reversal: self.reversal.as_ref(),
+            spans,
+            means,
+            immobile: &self.immobile,
+        })
     }
 
     /// Takes the sums and yields of a pass over all groups, in their order.
     pub fn settle<'y, const D: usize>(
         &mut self,
         program: &Program<D>,
-        sums: Vec<f64>,
+        sums: &[f64],
         yields: impl Iterator<Item = &'y Yield>,
     ) {
-        self.negative.clear();
-        self.negative.resize(program.n_columns(), false);
         for group in yields {
             self.added.iter_mut().zip(&group.added).for_each(|(sum, part)| sum.add(*part));
-            self.negative.iter_mut().zip(&group.negative).for_each(|(any, own)| *any |= own);
             add_work(&mut self.labour, &group.labour);
         }
-        let stride = program.n_reaction_sums();
+        let stride = self.immobile.len();
         let n_bins = program.grid.n_bins();
         let mean = program.plan.particles.count as f64 / n_bins as f64;
         for (idx, bins) in self.immobile.iter_mut().enumerate() {
@@ -204,7 +202,6 @@ impl Reactions {
                 *bin = (*bin + change / mean).max(0.0);
             }
         }
-        self.sums = sums;
     }
 
     /// A failure of the chemistry in the words of the plan.
@@ -274,59 +271,9 @@ impl<const D: usize> Run<'_, D> {
             }
             self.pass(Work { mixes, reacts: true, ..Work::default() }, step, still, &[span])?;
             mixes = false;
-            self.repair();
             self.react_without_particles(span, step)?;
         }
         Ok(())
-    }
-
-    /// Zones below zero, at the cost of the others in their bin.
-    ///
-    /// - Equation: `W ← max(W, 0) S / S₊`, `S = Σ W`, `S₊ = Σ max(W, 0)` over the bin.
-    /// - Symbols: `W` the value of one zone in one particle.
-    /// - Range: `S ≥ 0`, since it is the sum of concentrations of whole particles; if rounding makes it
-    ///   negative all particles get its mean.
-    /// - Source: methods, section 7.2: clip, and redistribute inside the bin. An instant zone is not
-    ///   stored, and what it gives up is taken from the mean of the others, which is its own.
-    /// - Shape: all particles; the sum over each bin stays.
-    fn repair(&mut self) {
-        let program = &self.program;
-        let columns: Vec<usize> = (0..program.n_columns()).filter(|&c| self.reactions.negative[c]).collect();
-        if columns.is_empty() {
-            return;
-        }
-        let n_immobile = self.reactions.immobile.len();
-        let stride = program.n_reaction_sums();
-        let n_bins = program.grid.n_bins();
-        // Factor and constant per slot: one of them is zero.
-        let cure = |column: usize| -> Vec<(f64, f64)> {
-            let of_slot = |(slot, sums): (usize, &[f64])| match (sums[0], sums[1], self.means.counts[slot]) {
-                _ if slot == n_bins => (1.0, 0.0),
-                (sum, positive, _) if sum >= 0.0 && positive > 0.0 => (sum / positive, 0.0),
-                (sum, _, n) => (0.0, if n > 0.0 { sum / n } else { 0.0 }),
-            };
-            let own = self.reactions.sums.chunks(stride).map(|sums| &sums[n_immobile + 2 * column..][..2]);
-            own.enumerate().map(of_slot).collect()
-        };
-        let cures: Vec<(usize, Vec<(f64, f64)>)> = columns.into_iter().map(|c| (c, cure(c))).collect();
-        parallel::for_each(&mut self.blocks.iter_mut().collect::<Vec<_>>(), &|_, block| {
-            let mut slots = [0; CHUNK];
-            for range in block.chunks() {
-                let slots = &mut slots[..range.len()];
-                program.grid.locate(block.positions.each_ref().map(|axis| &axis[range.clone()]), slots);
-                for (column, cure) in &cures {
-                    let values = &mut block.columns[*column][range.clone()];
-                    for (value, &slot) in values.iter_mut().zip(&*slots) {
-                        let (factor, constant) = cure[slot as usize];
-                        *value = if (slot as usize) < n_bins {
-                            value.max(0.0) * factor + constant
-                        } else {
-                            *value
-                        };
-                    }
-                }
-            }
-        });
     }
 
     /// What lives in a bin without particles reacts with nothing but itself.

@@ -205,10 +205,10 @@ impl<'a, const D: usize> Run<'a, D> {
     ) -> Result<(), RunError> {
         let stride = self.program.n_columns() + 1;
         let n_places = self.program.grid.n_slots();
-        let n_reaction_sums = self.program.n_reaction_sums();
+        let n_immobile = self.reactions.immobile.len();
         let sums_len = match work {
             Work { averages: true, .. } => n_places * stride,
-            Work { reacts: true, .. } => n_places * n_reaction_sums,
+            Work { reacts: true, .. } => n_places * n_immobile,
             _ => 0,
         };
         let n_lanes = if work.averages { average::lanes(n_places) } else { 1 };
@@ -238,7 +238,7 @@ impl<'a, const D: usize> Run<'a, D> {
                 }
                 group.sums.clear();
                 group.sums.resize(sums_len, 0.0);
-                let stride = if work.averages { stride } else { n_reaction_sums.max(1) };
+                let stride = if work.averages { stride } else { n_immobile.max(1) };
                 average::fold_lanes(&scratch.sums, n_lanes, stride, &mut group.sums);
                 group.yields.take(&mut scratch.bench);
             });
@@ -254,7 +254,7 @@ impl<'a, const D: usize> Run<'a, D> {
             self.is_averaged = true;
         } else if !spans.is_empty() {
             let sums = self.merged_sums();
-            self.reactions.settle(&self.program, sums, self.groups.iter().map(|group| &group.yields));
+            self.reactions.settle(&self.program, &sums, self.groups.iter().map(|group| &group.yields));
             self.is_averaged = false;
         }
         Ok(())
@@ -382,12 +382,19 @@ impl<'a, const D: usize> Run<'a, D> {
 /// Smallest value allowed per component: none where the initial values are negative somewhere.
 fn limits<const D: usize>(program: &Program<D>, before: &[Amount]) -> Vec<f64> {
     let n_slots = program.roles.len();
+    let kinetics = program.plan.chemistry.as_ref().and_then(|chemistry| chemistry.kinetics.as_ref());
+    let reactions = kinetics.filter(|_| program.plan.reacts_in_steps()).map(|kinetics| &kinetics.reactions);
+    let reacts = |component: usize| {
+        let mut changes = reactions.into_iter().flatten().flat_map(|reaction| &reaction.changes);
+        changes.any(|&(changed, _)| changed == component)
+    };
     (0..program.n_components())
         .map(|component| {
             let amounts = &before[component * n_slots..][..n_slots];
             let lowest = amounts.iter().map(|amount| amount.lowest).fold(f64::INFINITY, f64::min);
             let highest = amounts.iter().map(|amount| amount.highest).fold(0.0, f64::max);
-            if lowest >= 0.0 { -ROUNDING * highest } else { f64::NEG_INFINITY }
+            // What reacts may be below zero in one of the zones, and is not in the particle.
+            if lowest < 0.0 || reacts(component) { f64::NEG_INFINITY } else { -ROUNDING * highest }
         })
         .collect()
 }

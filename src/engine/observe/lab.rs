@@ -261,6 +261,11 @@ pub fn resolve<const D: usize>(
             target[idx] = bins[lab.slots[idx] as usize];
         }
     }
+    if needs.any()
+        && let Some(reversal) = &run.reactions.reversal
+    {
+        reversal.apply(&mut lab.components, n);
+    }
     chemistry::speciate(program, needs, n, &lab.components, &mut lab.unreacted, &mut lab.species);
     if needs.any() {
         equilibrate(run, lab);
