@@ -3,6 +3,8 @@
 //! Owns the left null space of the stoichiometry. May use nothing else of the crate. It deliberately
 //! changes values by factors only: what is zero stays zero, and signs stay.
 
+use std::cmp::Ordering;
+
 /// Rows `w` with `w · dy/dt = 0` for any rates.
 #[derive(Debug, Clone, Default)]
 pub struct Invariants {
@@ -82,7 +84,7 @@ impl Invariants {
     ///
     /// Equation: `y ← y + diag(|y|) Wᵀ λ`, `(W diag(|y|) Wᵀ) λ = totals − W y`.
     /// Symbols: W rows of invariants.
-    /// Dimensions and range: concentrations; nothing is done where more than a millionth would change.
+    /// Dimensions and range: concentrations; nothing is done where a component would lose more than itself.
     /// Source: least squares with the weights 1/|y|.
     /// Shape: a projection.
     pub fn restore(&self, y: &mut [f64], totals: &[f64], scratch: &mut Vec<f64>) {
@@ -105,14 +107,19 @@ impl Invariants {
         self.normal_matrix(y, scratch);
         solve_dense(m, scratch);
         let lambda = |i: usize| scratch[i * (m + 1) + m];
-        let is_small = (0..m).all(|i| self.rows[i].iter().all(|&(_, w)| (w * lambda(i)).abs() < 1e-6));
-        if !is_small {
+        // What a component changes by, as a part of itself, from all rows together.
+        let factor = |component: usize| -> f64 {
+            let own =
+                |row: &Vec<(usize, f64)>| row.iter().find(|(other, _)| *other == component).map(|e| e.1);
+            let parts = self.rows.iter().enumerate().filter_map(|(i, row)| Some(own(row)? * lambda(i)));
+            parts.sum()
+        };
+        let touched: Vec<usize> = (0..y.len()).filter(|&component| factor(component) != 0.0).collect();
+        if touched.iter().any(|&component| factor(component).partial_cmp(&-1.0) != Some(Ordering::Greater)) {
             return;
         }
-        for (i, row) in self.rows.iter().enumerate() {
-            for &(component, weight) in row {
-                y[component] += y[component].abs() * weight * lambda(i);
-            }
+        for component in touched {
+            y[component] += y[component].abs() * factor(component);
         }
     }
 

@@ -13,12 +13,13 @@ const PASSES: usize = 4;
 /// With mixing zones a particle's concentration is in part the mean of its bin. When others use that up, a
 /// particle that has used its own share already would be below zero: its conserved totals are those of a
 /// mixture and allow a state at or above zero, but some of its product has to become reactant again. In the
-/// limit of infinite rates this is what keeps a product at the smaller of two totals.
+/// limit of infinite rates this is what keeps a product at the smaller of two totals. A product below zero,
+/// which others gave back, takes from its reactants in the same way.
 #[derive(Debug, Clone)]
 pub struct Reversal {
     reactions: Vec<Vec<(usize, f64)>>,
-    /// Components that a reaction consumes.
-    consumed: Vec<usize>,
+    /// Components that a reaction changes.
+    changed: Vec<usize>,
 }
 
 impl Reversal {
@@ -29,28 +30,28 @@ impl Reversal {
         let reactions: Vec<Vec<(usize, f64)>> =
             kinetics.reactions.iter().map(|reaction| reaction.changes.clone()).collect();
         let changes = reactions.iter().flatten();
-        let mut consumed: Vec<usize> = changes.filter(|(_, nu)| *nu < 0.0).map(|&(k, _)| k).collect();
-        consumed.sort_unstable();
-        consumed.dedup();
-        Some(Self { reactions, consumed })
+        let mut changed: Vec<usize> = changes.map(|&(k, _)| k).collect();
+        changed.sort_unstable();
+        changed.dedup();
+        Some(Self { reactions, changed })
     }
 
-    /// Takes reactions back until no value of the first `n` particles is below zero, as far as products
-    /// allow; what is conserved by the reactions stays.
+    /// Moves reactions until no value of the first `n` particles is below zero, as far as the other side
+    /// of each allows; what is conserved by the reactions stays.
     ///
-    /// - Equation: `y ← y − x ν`, `x = min(−y_s / |ν_s|, min_p y_p / ν_p)` for a negative reactant `s` of the
-    ///   reaction and its products `p`.
+    /// - Equation: `y ← y − x ν`, `x = min(max_s y_s / ν_s, min_p y_p / ν_p)` for negative reactants `s` of a
+    ///   reaction and its products `p`; for negative products with the roles changed.
     /// - Symbols: `ν` changes of a reaction per unit of extent.
     /// - Range: any; reactions in their order, a few times over.
     /// - Source: irreversible reactions on conserved totals, methods, sections 7.2 and 7.6.
     /// - Shape: columns of one chunk.
     pub fn apply<C: AsMut<[f64]> + AsRef<[f64]>>(&self, columns: &mut [C], n: usize) {
         let is_below = |column: &usize| columns[*column].as_ref()[..n].iter().any(|&value| value < 0.0);
-        if !self.consumed.iter().any(is_below) {
+        if !self.changed.iter().any(is_below) {
             return;
         }
         for particle in 0..n {
-            if self.consumed.iter().any(|&k| columns[k].as_ref()[particle] < 0.0) {
+            if self.changed.iter().any(|&k| columns[k].as_ref()[particle] < 0.0) {
                 self.take_back(columns, particle);
             }
         }
@@ -61,24 +62,21 @@ impl Reversal {
         for _ in 0..PASSES {
             let mut is_done = true;
             for changes in &self.reactions {
-                let (mut wanted, mut possible) = (0.0_f64, f64::INFINITY);
-                for &(k, nu) in changes {
-                    let value = columns[k].as_ref()[particle];
-                    if nu < 0.0 {
-                        wanted = wanted.max(value / nu);
-                    } else if nu > 0.0 {
-                        possible = possible.min(value.max(0.0) / nu);
-                    }
+                // Forward and back: how much is missing on one side, and how much the other can give.
+                let (mut missing, mut given) = ([0.0_f64; 2], [f64::INFINITY; 2]);
+                for &(k, nu) in changes.iter().filter(|(_, nu)| *nu != 0.0) {
+                    let share = columns[k].as_ref()[particle] / nu.abs();
+                    let (own, other) = if nu < 0.0 { (1, 0) } else { (0, 1) };
+                    missing[own] = missing[own].max(-share);
+                    given[other] = given[other].min(share.max(0.0));
                 }
-                let extent = wanted.min(possible);
-                if extent > 0.0 {
+                let extent = missing[1].min(given[1]) - missing[0].min(given[0]);
+                if extent != 0.0 {
                     is_done = false;
                     for &(k, nu) in changes {
                         let value = &mut columns[k].as_mut()[particle];
-                        let after = *value - extent * nu;
                         // What is brought up to zero is zero.
-                        *value =
-                            if *value < 0.0 && after > 0.0 && extent == *value / nu { 0.0 } else { after };
+                        *value = if extent == *value / nu { 0.0 } else { *value - extent * nu };
                     }
                 }
             }
@@ -95,11 +93,10 @@ mod tests {
 
     fn reversal(reactions: &[&[(usize, f64)]]) -> Reversal {
         let reactions: Vec<Vec<(usize, f64)>> = reactions.iter().map(|changes| changes.to_vec()).collect();
-        let mut consumed: Vec<usize> =
-            reactions.iter().flatten().filter(|(_, nu)| *nu < 0.0).map(|&(k, _)| k).collect();
-        consumed.sort_unstable();
-        consumed.dedup();
-        Reversal { reactions, consumed }
+        let mut changed: Vec<usize> = reactions.iter().flatten().map(|&(k, _)| k).collect();
+        changed.sort_unstable();
+        changed.dedup();
+        Reversal { reactions, changed }
     }
 
     #[test]
@@ -108,6 +105,9 @@ mod tests {
         let mut columns = vec![vec![-0.25, 0.5], vec![2.0, 0.5], vec![1.0, 0.0]];
         reversal.apply(&mut columns, 2);
         assert_eq!(columns, [vec![0.0, 0.5], vec![2.25, 0.5], vec![0.75, 0.0]]);
+        let mut columns = vec![vec![0.5], vec![2.0], vec![-0.25]];
+        reversal.apply(&mut columns, 1);
+        assert_eq!(columns, [vec![0.25], vec![1.75], vec![0.0]]);
     }
 
     /// Two steps of a chain: the second has to give back before the first can.
