@@ -8,6 +8,7 @@ use lamella::plan::Species;
 use lamella::plan::chemistry::{Kinetic, Kinetics, Law, Laws, Method};
 use lamella::plan::tape::Operation;
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 
 const N: usize = 3;
 
@@ -66,8 +67,12 @@ fn compare(system: &System, y: &[f64; N], t: f64) -> Result<usize, String> {
         let (wide, narrow) = (difference(2e-5), difference(1e-5));
         for row in 0..N {
             let exact = if column < N { jacobian[row * N + column] } else { by_time[row] };
-            let scale = exact.abs() + value[row].abs() + 1.0;
-            if (wide[row] - narrow[row]).abs() > 1e-5 * scale || !(wide[row] + exact).is_finite() {
+            let scale = narrow[row].abs() + value[row].abs() + 1.0;
+            // Nor do those of what is out of proportion, as beside a pole.
+            if (wide[row] - narrow[row]).abs() > 1e-6 * scale
+                || scale > 1e6
+                || !(wide[row] + exact).is_finite()
+            {
                 continue;
             }
             n_compared += 1;
@@ -152,7 +157,7 @@ fn network(operations: Vec<Operation>) -> (Kinetics, Vec<Species>) {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 2000, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 20_000, rng_seed: RngSeed::Fixed(1), failure_persistence: None, ..ProptestConfig::default() })]
     #[test]
     fn random_laws(operations in operations(), y in prop::array::uniform3(0.05..2.0_f64), t in 0.1..2.0_f64) {
         let (kinetics, species) = network(operations);

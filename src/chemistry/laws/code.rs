@@ -167,6 +167,8 @@ struct Writer<'a> {
     readers: Vec<u32>,
     /// Products that are computed where they are added.
     is_fused: Vec<bool>,
+    /// Per sum that computes one: the product and the other operand.
+    fusions: Vec<Option<(Id, Id)>>,
     place: Vec<u32>,
     free: Vec<u16>,
     n_registers: usize,
@@ -182,9 +184,11 @@ impl<'a> Writer<'a> {
             graph.operands(id).for_each(|operand| readers[operand as usize] += 1);
         }
         roots.iter().for_each(|&root| readers[root as usize] += 1 << 24);
-        let mut is_fused = vec![false; n];
+        // Now, as readers are counted down while code is written.
+        let (mut is_fused, mut fusions) = (vec![false; n], vec![None; n]);
         for id in (0..n as Id).filter(|&id| is_reached[id as usize]) {
-            if let Some((product, _)) = fusion(graph, &readers, id) {
+            fusions[id as usize] = fusion(graph, &readers, id);
+            if let Some((product, _)) = fusions[id as usize] {
                 is_fused[product as usize] = true;
             }
         }
@@ -192,6 +196,7 @@ impl<'a> Writer<'a> {
             graph,
             readers,
             is_fused,
+            fusions,
             place: vec![u32::MAX; n],
             free: Vec::new(),
             n_registers: n_inputs,
@@ -217,14 +222,14 @@ impl<'a> Writer<'a> {
             _ if self.is_fused[at] => {}
             Node::Unary(unary, a) => self.emit(id, Opcode::Unary(unary), &[a]),
             Node::Select(a, b, c) => self.emit(id, Opcode::Select, &[a, b, c]),
-            Node::Binary(binary, a, b) => match fusion(self.graph, &self.readers, id) {
-                Some((product, other)) if self.is_fused[product as usize] => {
+            Node::Binary(binary, a, b) => match self.fusions[at] {
+                Some((product, other)) => {
                     let Node::Binary(_, left, right) = self.graph.node(product) else { return };
                     let opcode =
                         if binary == Binary::Add { Opcode::MultiplyAdd } else { Opcode::SubtractProduct };
                     self.emit(id, opcode, &[left, right, other]);
                 }
-                _ => self.emit(id, Opcode::Binary(binary), &[a, b]),
+                None => self.emit(id, Opcode::Binary(binary), &[a, b]),
             },
         }
     }
