@@ -157,13 +157,15 @@ fn degassing(tolerance: f64) -> Plan {
         constant: 0.0,
         terms: vec![(species, 1.0)],
     };
-    let complexes: [(f64, f64, &[(usize, f64)]); 4] = [
+    // Charge, log K, and how much of each primary.
+    type Complex<'a> = (f64, f64, &'a [(usize, f64)]);
+    let complexes: [Complex<'_>; 4] = [
         (-1.0, -8.0, &[(0, -1.0)]),
         (-1.0, 7.329, &[(0, 1.0), (1, 1.0)]),
         (0.0, 10.681, &[(0, 2.0), (1, 1.0)]),
         (0.0, 0.224, &[(1, 1.0), (2, 1.0)]),
     ];
-    let secondary = |(idx, (charge, log_k, nus)): (usize, &(f64, f64, &[(usize, f64)]))| Secondary {
+    let secondary = |(idx, (charge, log_k, nus)): (usize, &Complex<'_>)| Secondary {
         species: 3 + idx,
         charge: *charge,
         ion_size: 0.0,
