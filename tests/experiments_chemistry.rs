@@ -128,31 +128,85 @@ fn what_has_a_closed_form_is_also_integrated_within_ten_tolerances() {
     }
 }
 
-const INTEGRATED: [Scene; 2] = [scene!("kinetics_batch/association"), scene!("stiff/robertson")];
+const INTEGRATED: [Scene; 6] = [
+    scene!("kinetics_batch/association"),
+    scene!("stiff/robertson"),
+    scene!("stiff/hires"),
+    scene!("stiff/oregonator"),
+    scene!("stiff/pollution"),
+    scene!("stiff/brusselator"),
+];
+
+const TOLERANCES: [&str; 3] = ["1e-4", "1e-6", "1e-8"];
 
 #[test]
 fn what_is_integrated_is_within_ten_tolerances() {
     for (name, text) in INTEGRATED {
-        for tolerance in ["1e-4", "1e-6", "1e-8"] {
-            let run = run(text, &[("tol", tolerance)]);
-            run.check(name);
-            let (excess, work) = (run.measure("excess"), run.measure("work"));
-            tell(&format!("{name} {tolerance}: {excess:.1e} tolerances, {work} sub-steps"));
-            assert!(excess < 10.0, "{name} at {tolerance}: {excess} tolerances");
+        for tolerance in TOLERANCES {
+            check_excess(name, text, &[("tol", tolerance)]);
         }
     }
+}
+
+#[test]
+fn a_chain_of_monod_reactions_runs_out_without_going_below_zero() {
+    let (name, text) = scene!("stiff/monod_chain");
+    for half in ["1e-9 mol/L", "1e-6 mol/L", "1e-3 mol/L", "1 mol/L"] {
+        for tolerance in TOLERANCES {
+            let run = check_excess(name, text, &[("tol", tolerance), ("Ks", half)]);
+            let left = run.batches().last().expect("an output at the end");
+            assert!(left[..3].iter().all(|c| *c <= 1e-9), "{half}, {tolerance}: left {left:?}");
+        }
+    }
+}
+
+fn check_excess(name: &str, text: &str, set: &[(&str, &str)]) -> Finished {
+    let run = run(text, set);
+    assert!(matches!(run.method(), Method::Explicit | Method::Rosenbrock), "{name}: {:?}", run.method());
+    run.check(name);
+    let (excess, work) = (run.measure("excess"), run.measure("work"));
+    tell(&format!("{name} {set:?}: {excess:.1e} tolerances, {work} sub-steps"));
+    assert!(excess < 10.0, "{name} with {set:?}: {excess} tolerances");
+    run
 }
 
 /// At each of the three times, not only over the whole run.
 #[test]
 fn robertson_keeps_its_mass() {
     let (_, text) = scene!("stiff/robertson");
-    for tolerance in ["1e-4", "1e-6", "1e-8"] {
+    for tolerance in TOLERANCES {
         let run = run(text, &[("tol", tolerance)]);
         assert_eq!(run.batches().count(), 3);
         for batch in run.batches() {
             let mass = batch.iter().sum::<f64>() / 1000.0;
             assert!((mass - 1.0).abs() < 1e-13, "{tolerance}: mass {mass} of {batch:?}");
+        }
+    }
+}
+
+const SPECIATION: [(Scene, &str, &[&str]); 5] = [
+    (scene!("speciation/complex"), "K", &["1e-6 L/mol", "1 L/mol", "1e3 L/mol", "1e9 L/mol", "1e18 L/mol"]),
+    (scene!("speciation/complex"), "B0", &["1 umol/L", "0.3 mmol/L", "1 mmol/L", "3 mmol/L", "1 mol/L"]),
+    (scene!("speciation/carbonate"), "CT", &["1 umol/L", "1 mmol/L", "0.1 mol/L"]),
+    (scene!("speciation/calcite"), "particles", &["6"]),
+    (scene!("speciation/calcite"), "particles", &["600"]),
+];
+
+#[test]
+fn speciation_is_that_of_closed_forms_and_of_an_independent_solver() {
+    for ((name, text), what, values) in SPECIATION {
+        for value in values {
+            let run = run(text, &[(what, value)]);
+            for snapshot in &run.snapshots {
+                let Values::Binned { mean, .. } = &snapshot.values else { panic!("a profile") };
+                assert!(mean.iter().flatten().all(|c| *c >= 0.0), "{name}: below zero in {mean:?}");
+            }
+            let err = run.measure("err");
+            tell(&format!("{name}, {what} = {value}: {err:.1e}"));
+            assert!(err < 1e-10, "{name}, {what} = {value}: {err}");
+            if name.ends_with("calcite") {
+                assert_eq!(run.measure("left"), 0.0, "calcite is left where all of it dissolves");
+            }
         }
     }
 }

@@ -7,7 +7,7 @@ use super::error::RunError;
 use super::parallel;
 use super::place::{Strata, place};
 use super::program::Program;
-use crate::plan::{Component, Species};
+use crate::plan::{Component, Plan, Species};
 use crate::state::particles::{BLOCK, Block, state_bytes};
 
 /// All blocks of the run.
@@ -57,11 +57,14 @@ fn fill<const D: usize>(program: &Program<D>, block: &mut Block<D>) -> Result<()
 }
 
 /// Species restored from a relation are checked like carried ones: a negative start makes products
-/// from nothing. Values of rounding size, relative to what they are made of, pass.
+/// from nothing. Values of rounding size, relative to what they are made of, pass. What stands for a species in
+/// equilibrium is its total, and that of hydrogen is below zero where there is more hydroxide.
 fn check_signs<const D: usize>(program: &Program<D>, block: &Block<D>) -> Result<(), RunError> {
     let n_slots = program.roles.len();
-    let is_carried = |species: &&Species| species.terms.iter().all(|&(k, _)| k < program.n_components());
-    for species in program.plan.species.iter().filter(is_carried) {
+    let is_carried = |species: &Species| species.terms.iter().all(|&(k, _)| k < program.n_components());
+    let all = program.plan.species.iter().enumerate();
+    let signed = all.filter(|(idx, species)| is_carried(species) && !may_be_negative(program.plan, *idx));
+    for (_, species) in signed {
         for idx in 0..block.n_particles {
             let (mut value, mut size) = (species.constant, species.constant.abs());
             for &(component, coefficient) in &species.terms {
@@ -80,6 +83,18 @@ fn check_signs<const D: usize>(program: &Program<D>, block: &Block<D>) -> Result
         }
     }
     Ok(())
+}
+
+/// Whether a species is a primary one of which others take some away: its total has no sign.
+fn may_be_negative(plan: &Plan, species: usize) -> bool {
+    let Some(system) = plan.chemistry.as_ref().and_then(|chemistry| chemistry.equilibrium.as_ref()) else {
+        return false;
+    };
+    let takes = |coefficients: &[(usize, f64)]| {
+        coefficients.iter().any(|&(primary, nu)| system.primaries[primary].species == species && nu < 0.0)
+    };
+    system.secondaries.iter().any(|secondary| takes(&secondary.coefficients))
+        || system.minerals.iter().any(|mineral| takes(&mineral.coefficients))
 }
 
 /// What lives in bins: the values of the expressions at their centres, per immobile component and slot. The
