@@ -210,3 +210,19 @@ fn speciation_is_that_of_closed_forms_and_of_an_independent_solver() {
         }
     }
 }
+
+/// One turn takes about seven seconds and a hundred sub-steps.
+#[test]
+fn an_oscillator_that_turns_too_often_for_one_step_says_so() {
+    let (_, text) = scene!("stiff/brusselator");
+    let long = text.replace("run to 20 s, step 20 s", "run to 20_000 s, step 20_000 s");
+    assert_ne!(long, text);
+    let checked =
+        lamella::check(Sources::single("scene.lam", &*long), &Settings::default(), &Options::default());
+    let plan = checked.compiled.expect("a plan").plan;
+    let error = lamella::engine::run(&plan, &EngineSettings::default(), &Unattended, &mut |_| Ok(()))
+        .expect_err("more sub-steps than one step may take");
+    let message = error.to_string();
+    tell(&message);
+    assert!(message.contains("sub-steps, the most that one step may take"), "{message}");
+}

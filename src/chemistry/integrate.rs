@@ -284,7 +284,7 @@ fn conclude<S: Stepper>(
             || lanes.elapsed[l] + lanes.wanted[l] == lanes.elapsed[l]
             || lanes.wanted[l].partial_cmp(&(1e-40 * task.dt)) != Some(std::cmp::Ordering::Greater);
         if is_lost {
-            lose(lanes, task, l, step);
+            lose(lanes, task, l, step, S::MOST_STEPS);
         }
         return;
     }
@@ -305,7 +305,7 @@ fn conclude<S: Stepper>(
     if is_last {
         finish(network, lanes, task, l);
     } else if lanes.count[l] >= S::MOST_STEPS {
-        lose(lanes, task, l, step);
+        lose(lanes, task, l, step, S::MOST_STEPS);
     }
 }
 
@@ -329,11 +329,14 @@ fn finish(network: &Network, lanes: &mut Lanes, task: &mut Task<'_, '_>, l: usiz
 }
 
 /// Gives a particle up, as it was before the whole step.
-fn lose(lanes: &mut Lanes, task: &mut Task<'_, '_>, l: usize, step: f64) {
+fn lose(lanes: &mut Lanes, task: &mut Task<'_, '_>, l: usize, step: f64, most: u32) {
     let particle = lanes.particle[l] as usize;
     let broken = lanes.slopes.iter().position(|slope| !slope[l].is_finite());
     let why = match broken {
         Some(component) => Why::NotFinite { component },
+        None if lanes.count[l] >= most => {
+            Why::TooManySteps { t: task.t + lanes.elapsed[l], tried: lanes.count[l] }
+        }
         None => Why::StepTooSmall { t: task.t + lanes.elapsed[l], step },
     };
     task.failures.push(Failure { particle, why });

@@ -105,6 +105,11 @@ pub enum Why {
         t: f64,
         step: f64,
     },
+    /// The end of the step is not reached with as many sub-steps as one step may take.
+    TooManySteps {
+        t: f64,
+        tried: u32,
+    },
     NotFinite {
         component: usize,
     },

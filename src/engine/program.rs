@@ -6,7 +6,7 @@
 use super::error::RunError;
 use super::sides::Rule;
 use super::walk::Mover;
-use crate::plan::{Mixing, OutputKind, Plan, Quantity, Side, Species, Stage, ZoneRate};
+use crate::plan::{Mixing, OutputKind, Plan, Quantity, Side, Species, Stage, Time, ZoneRate};
 use crate::state::grid::Grid;
 
 /// What a stored column of a component is.
@@ -204,9 +204,11 @@ pub fn unsound(what: &str) -> RunError {
 fn check_scalars(plan: &Plan) -> Result<(), RunError> {
     let time = &plan.time;
     let last = time.duration - time.step * time.n_steps.saturating_sub(1) as f64;
+    // Twice the slack, since the last step is itself a difference of rounded numbers.
+    let longest = 1.0 + 2.0 * Time::slack(time.n_steps as f64);
     let is_time_sound = time.duration.is_finite()
         && time.duration >= 0.0
-        && (time.n_steps == 0 || (time.step > 0.0 && last > 0.0 && last <= time.step * (1.0 + 1e-9)));
+        && (time.n_steps == 0 || (time.step > 0.0 && last > 0.0 && last <= time.step * longest));
     if !is_time_sound {
         return Err(unsound("steps that do not add up to the duration"));
     }

@@ -213,6 +213,10 @@ impl Reactions {
                 precise(t),
                 precise(step)
             ),
+            Why::TooManySteps { t, tried } => format!(
+                "{tried} sub-steps, the most that one step may take, end at {} s; shorter steps allow more",
+                precise(t)
+            ),
             Why::NotFinite { component } => {
                 format!("the rate of `{}` is not a finite number", name(component))
             }

@@ -3,7 +3,7 @@
 
 use super::*;
 use crate::plan::tape::{Operation, Tape};
-use crate::plan::{Compiled, Options, Stage};
+use crate::plan::{Compiled, Options, Stage, Time};
 use crate::scenario;
 use crate::source::Sources;
 
@@ -142,4 +142,20 @@ fn an_amount_beyond_the_range_of_numbers_names_the_species() {
     let mut run = Run::<1>::new(&plan, &Settings::default()).unwrap();
     let error = run.step(0).unwrap_err();
     assert_eq!(error.to_string(), "step 1: the amount of `B` is not a finite number");
+}
+
+/// The last step is then longer than the others by all that rounding has left.
+#[test]
+fn durations_that_are_multiples_up_to_rounding_can_run() {
+    for (duration, step) in
+        [(10.0, 1.0 - 5e-10), (3_456_000.0, 172_800.0 * 1e-6), (360_000.0, 18_000.0 * 1e-6)]
+    {
+        let mut plan = compiled().plan;
+        plan.outputs.clear();
+        plan.time = Time::new(duration, step);
+        assert_eq!(plan.time.n_steps as f64, (duration / step).round());
+        assert!(Run::<1>::new(&plan, &Settings::default()).is_ok(), "{duration} s in steps of {step} s");
+        plan.time.n_steps -= 1;
+        assert!(Run::<1>::new(&plan, &Settings::default()).is_err(), "a step is missing of {duration} s");
+    }
 }

@@ -151,12 +151,7 @@ fn lower_reaction(reaction: &scenario::Reaction) -> Option<InstantReaction> {
 }
 
 fn time(scenario: &Scenario) -> Time {
-    let (duration, step) = (scenario.run.duration, scenario.run.step);
-    let exact = duration / step;
-    // A duration that is a multiple up to rounding has no extra sliver of a step.
-    let n_steps =
-        if (exact - exact.round()).abs() < 1e-9 * exact.max(1.0) { exact.round() } else { exact.ceil() };
-    Time { step, n_steps: (n_steps as u64).max(1), duration }
+    Time::new(scenario.run.duration, scenario.run.step)
 }
 
 fn lower_output(output: &scenario::Output) -> Output {

@@ -182,6 +182,21 @@ pub struct Time {
     pub duration: f64,
 }
 
+impl Time {
+    /// The part of a step by which the last one may be longer than the others, so that a duration which is a
+    /// multiple up to rounding has no extra sliver of a step.
+    pub fn slack(n_steps: f64) -> f64 {
+        (1e-9 * n_steps.max(1.0)).min(0.1)
+    }
+
+    pub fn new(duration: f64, step: f64) -> Self {
+        let exact = duration / step;
+        let is_whole = (exact - exact.round()).abs() < Self::slack(exact);
+        let n_steps = if is_whole { exact.round() } else { exact.ceil() };
+        Self { step, n_steps: (n_steps as u64).max(1), duration }
+    }
+}
+
 /// What is observed and when.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Output {

@@ -5,7 +5,7 @@
 
 use crate::plan::Plan;
 use crate::plan::tape::{Binary, Operation, Register};
-use crate::plan::{Component, ZoneRate, chemistry};
+use crate::plan::{Component, Time, ZoneRate, chemistry};
 
 /// A quantity of a scene that is multiplied.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -104,12 +104,8 @@ impl Knob {
                 }
             }
             Self::Step => {
-                let time = &mut plan.time;
-                time.step = (time.step * factor).min(time.duration);
-                let exact = time.duration / time.step;
-                let is_whole = (exact - exact.round()).abs() < 1e-9 * exact.max(1.0);
-                let n_steps = if is_whole { exact.round() } else { exact.ceil() };
-                time.n_steps = (n_steps as u64).max(1);
+                let duration = plan.time.duration;
+                plan.time = Time::new(duration, (plan.time.step * factor).min(duration));
             }
         }
     }
