@@ -107,7 +107,11 @@ fn tolerance<'a>(checker: &mut Checker<'a>, field: &'a tree::Field) -> Option<f6
 
 fn floor<'a>(checker: &mut Checker<'a>, field: &'a tree::Field) -> Option<(f64, Dimension)> {
     let checked = checker.check(&field.value, super::check::Allow::CONSTANT)?;
-    let dimensions = [Dimension::MOLAR_CONCENTRATION, Dimension::MASS_CONCENTRATION];
+    let of = |own: &Option<Dimension>| own.unwrap_or(Dimension::MOLAR_CONCENTRATION);
+    let species: Vec<Dimension> = checker.species_dimensions.iter().map(of).collect();
+    // A floor of what no species has would do nothing.
+    let mut dimensions = vec![Dimension::MOLAR_CONCENTRATION, Dimension::MASS_CONCENTRATION];
+    dimensions.retain(|dimension| species.is_empty() || species.contains(dimension));
     let kind = checker.expect_dimension(&field.value, &checked, "the floor", &dimensions)?;
     let value = checked.value()?;
     let Type::Number(dimension) = kind else {

@@ -187,9 +187,11 @@ impl<'a> Scope<'a> {
     /// The definition to blame for an undefined name: one that nothing uses and that differs by a slip,
     /// while the name is written the same in several places.
     fn misspelt_definition(&self, name: &str, uses: &BTreeSet<Span>) -> Option<(&str, &Entry<'a>)> {
-        if uses.len() < 2 {
-            return None;
-        }
+        if uses.len() < 2 { None } else { self.only_unused(name) }
+    }
+
+    /// The only definition that nothing uses and that differs from a name by a slip.
+    fn only_unused(&self, name: &str) -> Option<(&str, &Entry<'a>)> {
         let is_slip = |written: &str| {
             let allowed = (name.chars().count().max(written.chars().count()) / 3).max(1);
             strsim::damerau_levenshtein(name, written) <= allowed
@@ -207,7 +209,12 @@ impl<'a> Scope<'a> {
         let names = self.entries.keys().map(String::as_str);
         let functions = BUILT_IN_FUNCTIONS.iter().copied().chain(rate::ALL.iter().map(|item| item.name));
         let candidates = names.chain(functions).chain(axes.iter().map(String::as_str));
-        if let Some(candidate) = did_you_mean(name, candidates) {
+        if let Some((written, entry)) = self.only_unused(name) {
+            // One of the two places is misspelt, and nothing says which.
+            message = message
+                .at(entry.span, format!("`{written}` is defined here, and nothing uses it"))
+                .help(format!("write the same in both places: `{written}` or `{name}`"));
+        } else if let Some(candidate) = did_you_mean(name, candidates) {
             message = message.help(format!("did you mean `{candidate}`?"));
             if let Some(entry) = self.entries.get(candidate) {
                 message = message.also(entry.span, format!("`{candidate}` is defined here"));

@@ -252,7 +252,7 @@ impl<'t> Stop<'t> {
                         "must be closed after this"
                     },
                 )
-                .also(self.span(opener), "opened here")
+                .at(self.span(opener), "opened here")
                 .found(self.found())
                 .expected(format!("`{closer}`"));
         Some(diagnostic)
