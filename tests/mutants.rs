@@ -18,7 +18,7 @@ const SCENARIO_1: &str = "experiments/gramling/gramling.lam";
 /// The scenes with every entry of a sweep, and with names of a used scene.
 const SWEEPS: [&str; 2] = ["tests/scenes/sweeps.lam", "tests/scenes/study.lam"];
 /// Co-prime to the few mutants that each character makes, so that every way of damage is met.
-const STRIDE: usize = 23;
+const STRIDE: usize = 5;
 
 fn stride(name: &str) -> usize {
     if name == SCENARIO_1 || SWEEPS.contains(&name) || std::env::var_os("LAMELLA_ALL").is_some() {

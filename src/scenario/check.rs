@@ -2,7 +2,7 @@
 
 use super::expression::{Expr, Node, Type};
 use super::results::Measuring;
-use super::scope::{BUILT_IN_FUNCTIONS, Locals, Origin, Progress, Scope};
+use super::scope::{BUILT_IN_FUNCTIONS, Locals, Origin, Progress, Scope, is_slip};
 use crate::diagnostic::codes::{D005, D006, D008, D009, U101, U103, U106, U108};
 use crate::diagnostic::{Diagnostic, precise};
 use crate::maths::operator::{Binary, Unary};
@@ -210,6 +210,19 @@ impl<'a> Checker<'a> {
         None
     }
 
+    /// The only parameter of the function being put in that its body does not use and that differs from a
+    /// name by a slip.
+    fn misspelt_parameter(&self, text: &str) -> Option<&'a tree::Name> {
+        let call = self.call_stack.last()?;
+        let Origin::Function(statement) = self.scope.get(&call.function)?.origin else { return None };
+        let mut used = Vec::new();
+        super::slot::collect_names(&statement.body, &mut used);
+        let is_unused = |name: &&tree::Name| !used.contains(&name.value) && is_slip(text, &name.value);
+        let mut unused = statement.parameters.iter().filter(is_unused);
+        let parameter = unused.next()?;
+        unused.next().is_none().then_some(parameter)
+    }
+
     fn named(&mut self, text: &str, span: Span, allow: Allow) -> Option<Expr> {
         let is_doubtful = self.scope.is_doubtful(text);
         let Some(entry) = self.scope.get_mut(text) else {
@@ -225,6 +238,9 @@ impl<'a> Checker<'a> {
                 );
             } else {
                 self.scope.note_undefined(text, span);
+                if let Some(parameter) = self.misspelt_parameter(text) {
+                    self.scope.suspect(text, parameter);
+                }
             }
             return None;
         };

@@ -71,6 +71,8 @@ pub(super) struct Scope<'a> {
     doubtful: BTreeSet<String>,
     /// Undefined names and the places that use them; reported once each.
     undefined: BTreeMap<String, BTreeSet<Span>>,
+    /// For some of these the parameter of a function that may be what is misspelt.
+    suspects: BTreeMap<String, (String, Span)>,
 }
 
 /// Names that the language itself gives a meaning.
@@ -145,6 +147,11 @@ impl<'a> Scope<'a> {
         self.undefined.entry(name.to_owned()).or_default().insert(span);
     }
 
+    /// Notes a parameter that nothing uses and that an undefined name may mean.
+    pub(super) fn suspect(&mut self, name: &str, parameter: &tree::Name) {
+        self.suspects.insert(name.to_owned(), (parameter.value.clone(), parameter.span));
+    }
+
     /// The reference that a name in a measure means: that of this name, or for `reference` the only one.
     pub(super) fn reference(&self, name: &str) -> Option<usize> {
         match (self.entries.get(name).map(|entry| entry.origin), &self.references()[..]) {
@@ -192,11 +199,8 @@ impl<'a> Scope<'a> {
 
     /// The only definition that nothing uses and that differs from a name by a slip.
     fn only_unused(&self, name: &str) -> Option<(&str, &Entry<'a>)> {
-        let is_slip = |written: &str| {
-            let allowed = (name.chars().count().max(written.chars().count()) / 3).max(1);
-            strsim::damerau_levenshtein(name, written) <= allowed
-        };
-        let mut unused = self.entries.iter().filter(|(written, entry)| entry.n_uses == 0 && is_slip(written));
+        let mut unused =
+            self.entries.iter().filter(|(written, entry)| entry.n_uses == 0 && is_slip(name, written));
         let (written, entry) = unused.next()?;
         unused.next().is_none().then_some((written, entry))
     }
@@ -209,10 +213,12 @@ impl<'a> Scope<'a> {
         let names = self.entries.keys().map(String::as_str);
         let functions = BUILT_IN_FUNCTIONS.iter().copied().chain(rate::ALL.iter().map(|item| item.name));
         let candidates = names.chain(functions).chain(axes.iter().map(String::as_str));
-        if let Some((written, entry)) = self.only_unused(name) {
+        let parameter = self.suspects.get(name).map(|(written, span)| (written.as_str(), *span));
+        let unused = || self.only_unused(name).map(|(written, entry)| (written, entry.span));
+        if let Some((written, place)) = parameter.or_else(unused) {
             // One of the two places is misspelt, and nothing says which.
             message = message
-                .at(entry.span, format!("`{written}` is defined here, and nothing uses it"))
+                .at(place, format!("`{written}` is defined here, and nothing uses it"))
                 .help(format!("write the same in both places: `{written}` or `{name}`"));
         } else if let Some(candidate) = did_you_mean(name, candidates) {
             message = message.help(format!("did you mean `{candidate}`?"));
@@ -228,6 +234,12 @@ impl<'a> Scope<'a> {
         }
         message
     }
+}
+
+/// Whether two names differ by no more than a slip of the fingers.
+pub(super) fn is_slip(name: &str, written: &str) -> bool {
+    let allowed = (name.chars().count().max(written.chars().count()) / 3).max(1);
+    strsim::damerau_levenshtein(name, written) <= allowed
 }
 
 fn misspelt_definition(name: &str, first_use: Span, written: &str, entry: &Entry<'_>) -> Diagnostic {
