@@ -160,8 +160,15 @@ fn settings_reach_the_plan() {
     assert_eq!((set.tolerance, set.splitting), (1e-8, Splitting::Strang));
     assert_eq!(set.integrator, Integrator::Explicit);
     assert!(set.floors.iter().all(|floor| (floor - 1e-9).abs() < 1e-22), "{:?}", set.floors);
-    let other = compile(&format!("{ABC}{reaction}chemistry floor 1 ug/L"));
-    assert!(chemistry(&other).floors.iter().all(|floor| (floor - 2e-6).abs() < 1e-18));
+    // A floor in mass is for species in mass; where there are none it is refused.
+    let mixed = format!("{ABC}{reaction}species M\ninitial M = 1 mg/L\noutput total M at t = 1 d\n");
+    let other = compile(&format!("{mixed}chemistry floor 1 ug/L"));
+    let n_default = chemistry(&other).floors.iter().filter(|floor| (**floor - 2e-6).abs() < 1e-18).count();
+    assert_eq!(n_default, 3, "{:?}", chemistry(&other).floors);
+    let text = scene(&format!("{ABC}{reaction}chemistry floor 1 ug/L"));
+    let refused =
+        lamella::check(Sources::single("scene.lam", text), &Settings::default(), &Options::default());
+    assert!(refused.diagnostics.iter().any(|message| message.code.to_string() == "U104"));
 }
 
 #[test]

@@ -43,8 +43,10 @@ pub(crate) fn write_whole(path: &Path, text: &str) -> Result<(), Stopped> {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
-    let mut file =
-        tempfile::Builder::new().prefix(".lamella-").tempfile_in(folder).map_err(|error| failed(&error))?;
+    let mut file = tempfile::Builder::new()
+        .prefix(".lamella.tmp-")
+        .tempfile_in(folder)
+        .map_err(|error| failed(&error))?;
     let permissions = match std::fs::metadata(&target) {
         Ok(metadata) => metadata.permissions(),
         Err(_) => default_permissions(),

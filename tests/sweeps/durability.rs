@@ -43,6 +43,17 @@ fn a_killed_sweep_goes_on_where_it_stopped() {
     assert!(n_killed > 0, "every sweep was through before it was killed");
 }
 
+/// What a program leaves that is killed while it writes a text.
+#[test]
+fn texts_that_were_not_finished_go_with_the_next_sweep() {
+    let folder = Folder::new();
+    folder.write("s.lam", scene_with("  D linspace(1e-4 m^2/s, 1e-3 m^2/s, 3)"));
+    folder.lamella(&["sweep", "s.lam", "--out", "out"]).exits(0);
+    std::fs::write(folder.path("out/.lamella.tmp-26e7AA"), "half").unwrap();
+    folder.lamella(&["sweep", "s.lam", "--out", "out"]).exits(0);
+    assert!(!folder.path("out/.lamella.tmp-26e7AA").exists());
+}
+
 #[test]
 fn a_damaged_frame_is_named_and_run_again() {
     let folder = Folder::new();
