@@ -29,6 +29,23 @@ pub enum Term {
     Mean { fraction: f64 },
 }
 
+/// `U = Σ_i η_i W_i`, zones in order.
+#[inline(always)]
+#[allow(clippy::needless_range_loop)] // Zipped iterators are not always inlined; this loop is hot.
+pub fn total<C: AsRef<[f64]>>(terms: &[Term], columns: &[C], mixed: &[f64], target: &mut [f64]) {
+    let n = target.len();
+    for (rank, term) in terms.iter().enumerate() {
+        let (fraction, values) = match *term {
+            Term::Column { slot, fraction } => (fraction, &columns[slot].as_ref()[..n]),
+            Term::Mean { fraction } => (fraction, &mixed[..n]),
+        };
+        for idx in 0..n {
+            let before = if rank == 0 { 0.0 } else { target[idx] };
+            target[idx] = before + fraction * values[idx];
+        }
+    }
+}
+
 /// What is done in one step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Work {

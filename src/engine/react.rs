@@ -8,7 +8,7 @@
 use super::average::Means;
 use super::mix;
 use super::observe::lane_sum;
-use super::program::{Program, Term};
+use super::program::{Program, Term, total};
 use crate::chemistry::{Batch, Failure, Reactor, Reversal, Scratch, Work as Labour};
 use crate::state::particles::CHUNK;
 
@@ -255,19 +255,4 @@ pub fn add_work(sum: &mut Labour, part: &Labour) {
     sum.rejected += part.rejected;
     sum.rates += part.rates;
     sum.factored += part.factored;
-}
-
-/// `U = Σ_i η_i W_i`, zones in order.
-fn total(terms: &[Term], columns: &[&mut [f64]], mixed: &[f64], target: &mut [f64]) {
-    let n = target.len();
-    for (rank, term) in terms.iter().enumerate() {
-        let (fraction, values) = match *term {
-            Term::Column { slot, fraction } => (fraction, &columns[slot][..n]),
-            Term::Mean { fraction } => (fraction, &mixed[..n]),
-        };
-        for idx in 0..n {
-            let before = if rank == 0 { 0.0 } else { target[idx] };
-            target[idx] = before + fraction * values[idx];
-        }
-    }
 }

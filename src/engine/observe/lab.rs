@@ -7,7 +7,7 @@
 
 use super::super::average::Means;
 use super::super::mix;
-use super::super::program::{Program, Role, Term};
+use super::super::program::{Program, Role, total};
 use super::super::run::Run;
 use super::super::step::Scratch;
 use super::super::walk::{Leap, Noise, Place};
@@ -297,22 +297,6 @@ fn weighted(weights: &[(usize, f64)], columns: &[Vec<f64>], target: &mut [f64]) 
         for idx in 0..target.len() {
             let value = weight * column[idx];
             target[idx] = if rank == 0 { value } else { target[idx] + value };
-        }
-    }
-}
-
-/// `U = Σ_i η_i W_i`, zones in order.
-#[inline(always)]
-fn total(terms: &[Term], columns: &[Vec<f64>], mixed: &[f64], target: &mut [f64]) {
-    let n = target.len();
-    for (rank, term) in terms.iter().enumerate() {
-        let (fraction, values) = match *term {
-            Term::Column { slot, fraction } => (fraction, &columns[slot][..n]),
-            Term::Mean { fraction } => (fraction, &mixed[..n]),
-        };
-        for idx in 0..n {
-            let before = if rank == 0 { 0.0 } else { target[idx] };
-            target[idx] = before + fraction * values[idx];
         }
     }
 }
