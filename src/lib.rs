@@ -7,6 +7,7 @@ pub mod chemistry;
 pub mod diagnostic;
 pub mod engine;
 pub mod estimate;
+pub mod flow;
 pub mod maths;
 pub mod measure;
 pub mod plan;

@@ -11,6 +11,7 @@ const LAYERS: &[&[&str]] = &[
     &["syntax"],
     &["scenario"],
     &["plan"],
+    &["flow"],
     &["chemistry"],
     &["engine"],
     &["stress"],
