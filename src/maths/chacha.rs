@@ -4,7 +4,7 @@
 //! position: callers name the key, the stream and the draw, and get the same words for ever.
 
 /// Blocks of the cipher that one draw computes side by side.
-const LANES: usize = 64;
+pub const LANES: usize = 64;
 
 /// 32-bit words of one draw.
 pub const DRAW: usize = 16 * LANES;
@@ -38,11 +38,25 @@ macro_rules! quarter_round {
 pub fn draw(key: &[u32; 8], stream: u64, draw: u64, words: &mut Words) {
     let counter = draw * LANES as u64;
     let (low, high) = (counter as u32, (counter >> 32) as u32);
+    blocks(key, stream, |lane| (low.wrapping_add(lane as u32), high), words);
+}
+
+/// Fills `words` with the cipher block of each counter: lane `j` has the words of `counters[j]`.
+///
+/// Equation, symbols, range, source and shape are those of [`draw`]; the counters may be any.
+#[inline(always)]
+pub fn draw_each(key: &[u32; 8], stream: u64, counters: &[u64; LANES], words: &mut Words) {
+    blocks(key, stream, |lane| (counters[lane] as u32, (counters[lane] >> 32) as u32), words);
+}
+
+/// One cipher block per lane.
+#[inline(always)]
+fn blocks(key: &[u32; 8], stream: u64, counter: impl Fn(usize) -> (u32, u32), words: &mut Words) {
     let (stream_low, stream_high) = (stream as u32, (stream >> 32) as u32);
     let (rows, _) = words.as_chunks_mut::<LANES>();
     let [r0, r1, r2, r3, r4, r5, r6, r7, r8, r9, r10, r11, r12, r13, r14, r15] = rows else { return };
     for lane in 0..LANES {
-        let count = low.wrapping_add(lane as u32);
+        let (count, high) = counter(lane);
         let [mut x0, mut x1, mut x2, mut x3] = CONSTANTS;
         let [mut x4, mut x5, mut x6, mut x7, mut x8, mut x9, mut x10, mut x11] = *key;
         let (mut x12, mut x13, mut x14, mut x15) = (count, high, stream_low, stream_high);
@@ -112,6 +126,17 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn single_blocks_are_those_of_a_draw() {
+        let counters = std::array::from_fn(|lane| 3 * DRAW as u64 / 16 + lane as u64);
+        let (mut together, mut each) = ([0; DRAW], [0; DRAW]);
+        draw(&KEY, 7, 3, &mut together);
+        draw_each(&KEY, 7, &counters, &mut each);
+        assert_eq!(together, each);
+        draw_each(&KEY, 7, &[u64::MAX; LANES], &mut each);
+        assert!(each.chunks(LANES).all(|row| row.iter().all(|word| *word == row[0])));
     }
 
     #[test]

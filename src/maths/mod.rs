@@ -4,6 +4,7 @@
 //! deliberately never calls the system's library (`f64::exp` and friends pick code by CPU).
 
 pub mod chacha;
+pub mod exact;
 pub mod normal;
 pub mod operator;
 pub mod order;

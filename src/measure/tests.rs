@@ -24,6 +24,7 @@ fn plan(axes: Vec<Axis>, outputs: Vec<Output>) -> Plan {
         mixing: None,
         reactions: vec![],
         chemistry: None,
+        transport: None,
         time: Time { step: 1.0, n_steps: 1, duration: 1.0 },
         outputs,
         stages: vec![],

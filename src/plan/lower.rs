@@ -40,6 +40,7 @@ pub fn lower(scenario: &Scenario) -> Result<Lowered, Vec<Diagnostic>> {
         mixing: scenario.mixing.as_ref().map(lower_mixing),
         reactions: scenario.reactions.iter().filter_map(lower_reaction).collect(),
         chemistry,
+        transport: None,
         time: time(scenario),
         outputs: scenario.outputs.iter().map(lower_output).collect(),
         stages: vec![Stage::Mix, Stage::Move, Stage::Bound, Stage::Average, Stage::Observe],

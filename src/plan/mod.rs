@@ -25,6 +25,7 @@ pub mod passes;
 mod reaction_limits;
 pub mod tape;
 pub mod time_scales;
+pub mod transport;
 
 pub use crate::scenario::{OutputKind, Placement, Side};
 pub use compile::{Compiled, Options, Selection, compile, hash};
@@ -32,6 +33,7 @@ pub use compile::{Compiled, Options, Selection, compile, hash};
 use chemistry::Chemistry;
 use serde::{Deserialize, Serialize};
 use tape::Tape;
+use transport::Transport;
 
 /// Version of everything that decides bytes: stages, formulas, streams. Part of the plan hash.
 pub const NUMERICS_VERSION: u32 = 1;
@@ -54,6 +56,9 @@ pub struct Plan {
     /// Reactions at finite rates and in equilibrium; absent where there are none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub chemistry: Option<Chemistry>,
+    /// Absent where one velocity and one tensor say everything.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub transport: Option<Transport>,
     pub time: Time,
     pub outputs: Vec<Output>,
     /// What one step does, in order.

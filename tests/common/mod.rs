@@ -38,6 +38,7 @@ pub fn plan() -> Plan {
         mixing: None,
         reactions: Vec::new(),
         chemistry: None,
+        transport: None,
         time: Time { step: 2.0, n_steps: 10, duration: 20.0 },
         outputs: vec![
             output(OutputKind::Profile, vec![One(0), One(1)], vec![N_BINS, 1], &[10.0, 20.0]),

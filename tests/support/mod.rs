@@ -78,6 +78,7 @@ pub fn front(n_particles: u64, bins: usize, duration: f64, step: f64) -> Plan {
             products: vec![(2, 1.0)],
         }],
         chemistry: None,
+        transport: None,
         time: Time { step, n_steps: (duration / step - 1e-9).ceil() as u64, duration },
         outputs: vec![],
         stages: vec![Stage::FusedStep, Stage::Observe],
@@ -113,6 +114,7 @@ pub fn plain(axes: Vec<Axis>, walk: Walk, n_particles: u64, duration: f64, step:
         mixing: None,
         reactions: vec![],
         chemistry: None,
+        transport: None,
         ..front(n_particles, 1, duration, step)
     }
 }

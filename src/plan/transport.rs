@@ -1,0 +1,249 @@
+//! Transport along tracks: what a plan says of flow, dispersion, sides, sources and masses.
+//!
+//! Owns the types. May use tapes. It deliberately solves nothing: a flow is solved or read by `flow`, and
+//! particles are moved by the engine.
+
+use super::tape::Tape;
+use serde::{Deserialize, Serialize};
+
+/// Transport in anything but uniform flow between simple sides, or of particles that carry mass.
+///
+/// Positions are those of the scene's axes; tapes read x, y, z and t.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Transport {
+    pub flow: Flow,
+    pub dispersion: Dispersion,
+    /// Volume of water per volume of medium; 1 without a medium.
+    pub porosity: Tape,
+    /// What happens at each side, per active axis: the lower, the upper. The first patch that holds a place
+    /// decides; the last one has no limits.
+    pub sides: Vec<[Vec<Patch>; 2]>,
+    pub sources: Vec<Source>,
+    /// Masses of one species each; none if the particles are fluid.
+    pub populations: Vec<Population>,
+    /// First-order reactions of what carries mass; none if nothing reacts.
+    pub decay: Option<Decay>,
+    /// Steps of each particle's own within a step.
+    pub sub_steps: Option<SubSteps>,
+    /// Planes normal to an axis at which coefficients jump.
+    pub interfaces: Vec<Interface>,
+}
+
+/// Where the water goes. Velocities are those of the water in its pores, relative to the frame.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Flow {
+    /// One velocity, an entry per active axis, m/s.
+    Uniform(Vec<f64>),
+    /// An expression per active axis, m/s.
+    Expression(Vec<Tape>),
+    /// Solved for on cells.
+    Darcy(Box<Darcy>),
+    /// Read from a file.
+    File(FlowFile),
+}
+
+/// Darcy flow `q = −K ∇h`, `∇·q = wells`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Darcy {
+    /// Cells along each axis of the domain.
+    pub cells: Vec<usize>,
+    /// Per axis of the domain: the lower side, the upper side.
+    pub sides: Vec<[DarcySide; 2]>,
+    pub conductivity: Conductivity,
+    /// Conductivity along each axis over that along the first.
+    pub anisotropy: Vec<f64>,
+    pub wells: Vec<Well>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DarcySide {
+    /// m
+    Head(f64),
+    /// Specific discharge into the domain, m/s.
+    Flux(f64),
+    NoFlow,
+    Periodic,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Conductivity {
+    /// m/s, at the centres of cells.
+    Expression(Tape),
+    Lognormal {
+        /// m/s
+        geometric_mean: f64,
+        /// Of ln K.
+        variance: f64,
+        covariance: Covariance,
+        /// Correlation length per axis of the domain, m.
+        lengths: Vec<f64>,
+        seed: u64,
+    },
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Covariance {
+    /// `σ² exp(−√Σ (d_i/λ_i)²)`
+    Exponential,
+    /// `σ² exp(−Σ (d_i/λ_i)²)`
+    Gaussian,
+}
+
+/// A well in a Darcy flow.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Well {
+    pub name: String,
+    /// Lower and upper end per axis of the domain, m: the same but along the screen.
+    pub low: Vec<f64>,
+    pub high: Vec<f64>,
+    /// Water injected (positive) or taken out, m³/s; per m or m² with fewer axes.
+    pub rate: f64,
+}
+
+/// A flow in a file of the scene's folder.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FlowFile {
+    pub format: FlowFormat,
+    /// File names, with the hash of each one's bytes.
+    pub files: Vec<(String, String)>,
+    /// Factors of the file's units to SI: lengths, velocities.
+    pub length: f64,
+    pub velocity: f64,
+    pub is_discharge: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FlowFormat {
+    Npy,
+    Csv,
+    Parquet,
+    Modflow6,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Dispersion {
+    /// Lower triangle of the constant tensor, m²/s, row by row.
+    Constant(Vec<f64>),
+    /// The same in all directions, m²/s, over the place.
+    Isotropic(Tape),
+    /// Lengths in m; molecular in m²/s.
+    Velocity { longitudinal: f64, transverse: f64, transverse_vertical: f64, molecular: f64 },
+}
+
+/// A part of a side.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Patch {
+    /// Limits per active axis, m; the whole extent where there is none.
+    pub low: Vec<f64>,
+    pub high: Vec<f64>,
+    pub rule: SideRule,
+}
+
+/// What happens to particles at a side.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SideRule {
+    Reflect,
+    Periodic,
+    /// Walks on outside.
+    Open,
+    /// Concentration 0.
+    Absorb,
+    /// Surface reaction `J = k c`, m/s.
+    Partial(f64),
+    /// Leaves with the water: no gradient.
+    Outflow,
+    /// Water that enters carries these concentrations, one tape per species.
+    Inflow(Vec<Tape>),
+    /// These concentrations are held at the side, one tape per species.
+    Held(Vec<Tape>),
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Source {
+    pub name: String,
+    pub species: usize,
+    pub region: Region,
+    pub strength: Strength,
+    /// From, to, s. A pulse has the same twice.
+    pub during: (f64, f64),
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Region {
+    Point(Vec<f64>),
+    Line(Vec<f64>, Vec<f64>),
+    Box(Vec<f64>, Vec<f64>),
+    /// Centre and standard deviation per active axis, m.
+    Gaussian(Vec<f64>, Vec<f64>),
+    /// Places and masses of a table, in its order: positions one after the other, then the mass.
+    Table(Vec<Vec<f64>>),
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Strength {
+    /// mol or kg at once (per m², m with fewer axes).
+    Pulse(f64),
+    /// mol/s or kg/s.
+    Rate(f64),
+    /// mol/m³ or kg/m³ that the water there is kept at.
+    Held(f64),
+}
+
+/// Particles that carry the mass of one species.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Population {
+    pub species: usize,
+    /// Particles that initial mass, sources and inflow are divided into.
+    pub count: u64,
+    /// Total over mobile concentration.
+    pub retardation: f64,
+    /// Molecular diffusion of its own, m²/s; that of the medium if absent.
+    pub molecular: Option<f64>,
+    /// False: it stays where it is.
+    pub is_mobile: bool,
+    /// Concentration in the water at the start.
+    pub initial: Tape,
+}
+
+/// First-order reactions: `dc/dt = M c`, 1/s, row by row over populations.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Decay {
+    pub rates: Vec<f64>,
+}
+
+/// Criteria for the steps of single particles.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SubSteps {
+    /// Σ |v_i| Δt / Δx_i
+    pub courant: f64,
+    /// Σ D_ii Δt / Δx_i²
+    pub dispersion: f64,
+}
+
+/// A plane at which dispersion or porosity jump.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Interface {
+    /// Active axis.
+    pub axis: usize,
+    /// m
+    pub at: f64,
+}
