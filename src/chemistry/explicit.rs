@@ -63,7 +63,7 @@ impl Stepper for Explicit<'_> {
     }
 
     fn local_share(&self) -> f64 {
-        0.5
+        0.35
     }
 
     fn work(&self) -> (u64, u64) {

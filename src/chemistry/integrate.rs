@@ -15,6 +15,11 @@ use pulp::NullaryFnOnce;
 /// A lane without a particle.
 const IDLE: u32 = u32::MAX;
 
+/// A step is at most this many times longer than the one before.
+const MOST_GROWTH: f64 = 5.0;
+/// What is asked for, of the size that would just have been allowed.
+const CAUTION: f64 = 0.9;
+
 /// One step of all lanes.
 pub(super) trait Stepper {
     /// Sub-steps after which a particle is given up.
@@ -64,6 +69,8 @@ pub(super) struct Lanes {
     pub t: f64,
     /// The size that the error asks for.
     wanted: Lane,
+    /// The size that the error of the last accepted step would just have allowed; 0: none was accepted.
+    reach: Lane,
     totals: Vec<Lane>,
     particle: [u32; LANES],
     count: [u32; LANES],
@@ -190,6 +197,7 @@ fn load(network: &Network, lanes: &mut Lanes, task: &Task<'_, '_>, l: usize, par
     lanes.elapsed[l] = 0.0;
     lanes.particle[l] = particle;
     lanes.count[l] = 0;
+    lanes.reach[l] = 0.0;
     lanes.is_fresh[l] = lanes.wanted[l] == 0.0;
     lanes.was_rejected[l] = false;
 }
@@ -230,7 +238,8 @@ fn choose_steps(network: &Network, lanes: &mut Lanes, dt: f64) {
 struct Judged {
     /// The error in tolerances; NaN if something was not finite.
     norm: Lane,
-    factor: Lane,
+    /// How many times longer the step could just have been.
+    growth: Lane,
     /// True as 1: no value is below nothing.
     is_positive: Lane,
 }
@@ -243,23 +252,22 @@ fn judge(network: &Network, lanes: &mut Lanes, exponent: f64, local_share: f64) 
         let small = network.small[i];
         let lowest = if network.system.is_positive[i] { -small } else { f64::NEG_INFINITY };
         for l in 0..LANES {
+            // Where a value ends it has to be right: in one step it may fall by decades. What changes its
+            // sign is nothing special when it is zero. Not `max`: NaN must come through.
             let (old, new) = (lanes.y[i][l].abs(), lanes.new[i][l].abs());
-            let larger = if old > new { old } else { new };
-            // Not `max`: NaN must come through.
-            let share = lanes.error[i][l] / (local_share * (small + network.tolerance * larger));
+            let size = if old > new && lowest < -small { old } else { new };
+            let share = lanes.error[i][l] / (local_share * (small + network.tolerance * size));
             let broken = lanes.new[i][l] * 0.0;
             sum[l] += share * share + broken;
             is_positive[l] = if lanes.new[i][l] < lowest { 0.0 } else { is_positive[l] };
         }
     }
-    let (mut norm, mut factor) = ([0.0; LANES], [0.0; LANES]);
+    let (mut norm, mut growth) = ([0.0; LANES], [0.0; LANES]);
     for l in 0..LANES {
         norm[l] = (sum[l] / n as f64).sqrt();
-        let ideal = 0.9 * vector::pow(norm[l], -1.0 / exponent);
-        let low = if ideal < 0.2 { 0.2 } else { ideal };
-        factor[l] = if low > 5.0 { 5.0 } else { low };
+        growth[l] = vector::pow(norm[l], -1.0 / exponent);
     }
-    Judged { norm, factor, is_positive }
+    Judged { norm, growth, is_positive }
 }
 
 /// Accepts or rejects the step of one lane, and lets its particle go when it is done or lost.
@@ -277,7 +285,7 @@ fn conclude<S: Stepper>(
     if !is_right {
         task.work.rejected += 1;
         // Not finite: far away. Negative: half. Otherwise the error says how much.
-        let shrink = if judged.norm[l] > 1.0 { judged.factor[l].min(0.9) } else { 0.5 };
+        let shrink = if judged.norm[l] > 1.0 { (CAUTION * judged.growth[l]).clamp(0.2, 0.9) } else { 0.5 };
         lanes.wanted[l] = step * if judged.norm[l].is_nan() { 0.1 } else { shrink };
         lanes.was_rejected[l] = true;
         let is_lost = lanes.count[l] >= S::MOST_STEPS
@@ -295,8 +303,13 @@ fn conclude<S: Stepper>(
         let is_none = (*is_positive && new < 0.0) || new.abs() < 1e-250;
         lanes.y[i][l] = if is_none { 0.0 } else { new };
     }
-    let most = if lanes.was_rejected[l] { 1.0 } else { 5.0 };
-    let asked = step * judged.factor[l].min(most);
+    // The size that is allowed goes on shrinking as it did from step to step: K. Gustafsson 1994, ACM Trans.
+    // Math. Softw. 20, 496, doi:10.1145/198429.198437.
+    let reach = step * judged.growth[l].min(MOST_GROWTH / CAUTION);
+    let trend = if lanes.reach[l] > reach { reach / lanes.reach[l] } else { 1.0 };
+    lanes.reach[l] = reach;
+    let asked = (CAUTION * reach * trend).max(0.2 * step);
+    let asked = if lanes.was_rejected[l] { asked.min(step) } else { asked };
     // A step that was cut short at the end says little.
     lanes.wanted[l] = if step < lanes.wanted[l] { asked.max(lanes.wanted[l]) } else { asked };
     lanes.was_rejected[l] = false;

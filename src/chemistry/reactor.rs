@@ -13,7 +13,7 @@ use super::integrate::{Lanes, Network, Task, integrate};
 use super::invariants::Invariants;
 use super::laws::{Basis, System};
 use super::matrix::Symbolic;
-use super::rosenbrock::{RODAS3, RODAS4, Rosenbrock};
+use super::rosenbrock::Rosenbrock;
 use crate::maths::wide::Width;
 use crate::plan::chemistry::{Chemistry, Kinetics, Law, Method};
 use crate::plan::{Plan, Species};
@@ -46,7 +46,6 @@ enum Integrator {
         network: Box<Network>,
         symbolic: Symbolic,
         is_explicit: bool,
-        is_third_order: bool,
     },
 }
 
@@ -204,7 +203,7 @@ impl Reactor {
     }
 
     fn integrate(&self, batch: Batch<'_>, scratch: &mut Scratch) -> Result<Work, Failure> {
-        let Integrator::Adaptive { network, symbolic, is_explicit, is_third_order } = &self.integrator else {
+        let Integrator::Adaptive { network, symbolic, is_explicit } = &self.integrator else {
             return Ok(Work::default());
         };
         let Scratch { lanes, failures, left_over, .. } = scratch;
@@ -231,13 +230,7 @@ impl Reactor {
             left_over.sort_unstable();
             task.chosen = Some(left_over);
         }
-        if *is_third_order {
-            let stepper = Rosenbrock { network, symbolic, tableau: &RODAS3, aqueous };
-            integrate(self.width, network, &stepper, lanes, &mut task);
-        } else {
-            let stepper = Rosenbrock { network, symbolic, tableau: &RODAS4, aqueous };
-            integrate(self.width, network, &stepper, lanes, &mut task);
-        }
+        integrate(self.width, network, &Rosenbrock { network, symbolic, aqueous }, lanes, &mut task);
         match task.failures.iter().min_by_key(|failure| failure.particle) {
             Some(failure) => Err(*failure),
             None => Ok(task.work),
@@ -320,7 +313,7 @@ impl Integrator {
                 let is_explicit = kinetics.method == Method::Explicit && !system.is_gated;
                 let invariants = Invariants::new(n, &changes);
                 let network = Box::new(Network { system, invariants, small, tolerance });
-                Self::Adaptive { network, symbolic, is_explicit, is_third_order: tolerance >= 1e-5 }
+                Self::Adaptive { network, symbolic, is_explicit }
             }
         })
     }
@@ -343,7 +336,7 @@ impl Integrator {
         let symbolic = Symbolic::new(n, &everywhere);
         let invariants = Invariants::new(n, &changes);
         let network = Box::new(Network { system, invariants, small, tolerance });
-        Ok(Self::Adaptive { network, symbolic, is_explicit: false, is_third_order: tolerance >= 1e-5 })
+        Ok(Self::Adaptive { network, symbolic, is_explicit: false })
     }
 }
 

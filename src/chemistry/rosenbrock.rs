@@ -1,4 +1,4 @@
-//! Rosenbrock methods: L-stable steps with one factored matrix each and no iteration.
+//! A Rosenbrock method: L-stable steps with one factored matrix each and no iteration.
 //!
 //! Owns the coefficients and one step over lanes. May use the laws, sparse matrices and the driver of
 //! steps. It deliberately controls no step size.
@@ -13,36 +13,17 @@ use crate::maths::wide::Width;
 /// `(I/(hγ) − J) K_i = f(t + α_i h, Y_i) + Σ_{j<i} (c_ij/h) K_j + γ_i h ∂f/∂t`,
 /// `Y_i = y + Σ a_ij K_j`, `y⁺ = y + Σ m_i K_i`, `error = Σ e_i K_i`.
 #[derive(Debug)]
-pub(super) struct Tableau<const S: usize> {
+struct Tableau {
     gamma: f64,
-    a: [[f64; S]; S],
-    c: [[f64; S]; S],
-    m: [f64; S],
-    e: [f64; S],
-    alpha: [f64; S],
-    gammas: [f64; S],
-    /// Whether a stage evaluates the rates anew.
-    is_new: [bool; S],
-    /// Order of the estimate plus 1.
-    exponent: u32,
-    local_share: f64,
+    a: [[f64; STAGES]; STAGES],
+    c: [[f64; STAGES]; STAGES],
+    m: [f64; STAGES],
+    e: [f64; STAGES],
+    alpha: [f64; STAGES],
+    gammas: [f64; STAGES],
 }
 
-/// Rodas3: order 3(2), stiffly accurate.
-///
-/// Source: A. Sandu et al. 1997, Atmos. Environ. 31, 3459, doi:10.1016/S1352-2310(97)83212-8.
-pub(super) const RODAS3: Tableau<4> = Tableau {
-    gamma: 0.5,
-    a: [[0.0; 4], [0.0; 4], [2.0, 0.0, 0.0, 0.0], [2.0, 0.0, 1.0, 0.0]],
-    c: [[0.0; 4], [4.0, 0.0, 0.0, 0.0], [1.0, -1.0, 0.0, 0.0], [1.0, -1.0, -8.0 / 3.0, 0.0]],
-    m: [2.0, 0.0, 1.0, 1.0],
-    e: [0.0, 0.0, 0.0, 1.0],
-    alpha: [0.0, 0.0, 1.0, 1.0],
-    gammas: [0.5, 1.5, 0.0, 0.0],
-    is_new: [false, false, true, true],
-    exponent: 3,
-    local_share: 0.25,
-};
+const STAGES: usize = 6;
 
 const A5: [f64; 4] =
     [1.221_224_509_226_641, 6.019_134_481_288_629, 12.537_083_329_320_87, -0.687_886_036_105_895];
@@ -51,10 +32,10 @@ const A5: [f64; 4] =
 ///
 /// Source: E. Hairer and G. Wanner 1996, Solving Ordinary Differential Equations II, 2nd ed., Springer,
 /// IV.7, code RODAS, method 1.
-pub(super) const RODAS4: Tableau<6> = Tableau {
+const RODAS4: Tableau = Tableau {
     gamma: 0.25,
     a: [
-        [0.0; 6],
+        [0.0; STAGES],
         [1.544, 0.0, 0.0, 0.0, 0.0, 0.0],
         [0.946_678_528_081_582_6, 0.255_701_169_898_328_4, 0.0, 0.0, 0.0, 0.0],
         [3.314_825_187_068_521, 2.896_124_015_972_201, 0.998_641_913_997_781_7, 0.0, 0.0, 0.0],
@@ -62,7 +43,7 @@ pub(super) const RODAS4: Tableau<6> = Tableau {
         [A5[0], A5[1], A5[2], A5[3], 1.0, 0.0],
     ],
     c: [
-        [0.0; 6],
+        [0.0; STAGES],
         [-5.6688, 0.0, 0.0, 0.0, 0.0, 0.0],
         [-2.430_093_356_833_875, -0.206_359_915_709_191_5, 0.0, 0.0, 0.0, 0.0],
         [-0.107_352_905_815_137_5, -9.594_562_251_023_355, -20.470_286_148_096_16, 0.0, 0.0, 0.0],
@@ -87,34 +68,30 @@ pub(super) const RODAS4: Tableau<6> = Tableau {
     e: [0.0, 0.0, 0.0, 0.0, 0.0, 1.0],
     alpha: [0.0, 0.386, 0.21, 0.63, 1.0, 1.0],
     gammas: [0.25, -0.1043, 0.1035, -0.036_200_000_000_000_23, 0.0, 0.0],
-    is_new: [false, true, true, true, true, true],
-    exponent: 4,
-    local_share: 1.0,
 };
 
 /// A method for a network.
 #[derive(Debug)]
-pub(super) struct Rosenbrock<'a, const S: usize> {
+pub(super) struct Rosenbrock<'a> {
     pub network: &'a Network,
     pub symbolic: &'a Symbolic,
-    pub tableau: &'static Tableau<S>,
     /// Rates are those of species in equilibrium.
     pub aqueous: Option<(&'a Aqueous, Width)>,
 }
 
-impl<const S: usize> Stepper for Rosenbrock<'_, S> {
+impl Stepper for Rosenbrock<'_> {
     const MOST_STEPS: u32 = 200_000;
 
     fn exponent(&self) -> f64 {
-        f64::from(self.tableau.exponent)
+        4.0
     }
 
     fn local_share(&self) -> f64 {
-        self.tableau.local_share
+        1.0
     }
 
     fn work(&self) -> (u64, u64) {
-        (1 + self.tableau.is_new.iter().filter(|is_new| **is_new).count() as u64, 1)
+        (STAGES as u64, 1)
     }
 
     #[inline(always)]
@@ -148,7 +125,7 @@ impl<const S: usize> Stepper for Rosenbrock<'_, S> {
         let mut diagonal = [0.0; LANES];
         for l in 0..LANES {
             inverse[l] = 1.0 / lanes.step[l];
-            diagonal[l] = inverse[l] / self.tableau.gamma;
+            diagonal[l] = inverse[l] / RODAS4.gamma;
         }
         let places = &system.full.outputs[n..n + system.pattern.len()];
         match (self.aqueous, &mut lanes.aqueous) {
@@ -159,8 +136,8 @@ impl<const S: usize> Stepper for Rosenbrock<'_, S> {
             _ => self.symbolic.fill(&diagonal, &lanes.full, places, &mut lanes.matrix),
         }
         self.symbolic.factor(&mut lanes.matrix);
-        for stage in 0..S {
-            if self.tableau.is_new[stage] {
+        for stage in 0..STAGES {
+            if stage > 0 {
                 self.evaluate(lanes, stage);
             }
             self.right_side(lanes, stage, &inverse);
@@ -168,24 +145,24 @@ impl<const S: usize> Stepper for Rosenbrock<'_, S> {
             self.symbolic.solve(&lanes.matrix, own);
         }
         let Lanes { y, new, error, stages, .. } = lanes;
-        combine(n, &self.tableau.m, Some(y), stages, new);
-        combine(n, &self.tableau.e, None, stages, error);
+        combine(n, &RODAS4.m, Some(y), stages, new);
+        combine(n, &RODAS4.e, None, stages, error);
     }
 }
 
-impl<const S: usize> Rosenbrock<'_, S> {
+impl Rosenbrock<'_> {
     /// Rates at the stage's own values and time.
     #[inline(always)]
     fn evaluate(&self, lanes: &mut Lanes, stage: usize) {
         let system = &self.network.system;
         let Lanes { y, stages, sum, rates, slopes, elapsed, step, t, aqueous, .. } = lanes;
-        combine(system.n_components, &self.tableau.a[stage], Some(y), stages, sum);
+        combine(system.n_components, &RODAS4.a[stage], Some(y), stages, sum);
         match (self.aqueous, aqueous) {
             (Some((model, width)), Some(own)) => model.fill(width, sum, rates, own),
             _ => load(&system.is_positive, sum, rates),
         }
         for l in 0..LANES {
-            rates[system.n_variables + 3][l] = *t + (elapsed[l] + self.tableau.alpha[stage] * step[l]);
+            rates[system.n_variables + 3][l] = *t + (elapsed[l] + RODAS4.alpha[stage] * step[l]);
         }
         system.rates.run(rates);
         for (slope, &place) in slopes.iter_mut().zip(&system.rates.outputs) {
@@ -199,7 +176,7 @@ impl<const S: usize> Rosenbrock<'_, S> {
         let n = system.n_components;
         let (done, own) = lanes.stages.split_at_mut(stage * n);
         own[..n].copy_from_slice(&lanes.slopes);
-        for (j, &coefficient) in self.tableau.c[stage][..stage].iter().enumerate() {
+        for (j, &coefficient) in RODAS4.c[stage][..stage].iter().enumerate() {
             if coefficient == 0.0 {
                 continue;
             }
@@ -209,12 +186,12 @@ impl<const S: usize> Rosenbrock<'_, S> {
                 }
             }
         }
-        if system.reads_time && self.tableau.gammas[stage] != 0.0 {
+        if system.reads_time && RODAS4.gammas[stage] != 0.0 {
             let places = &system.full.outputs[n + system.pattern.len()..];
             for (target, &place) in own[..n].iter_mut().zip(places) {
                 let by_time = &lanes.full[usize::from(place)];
                 for l in 0..LANES {
-                    target[l] += self.tableau.gammas[stage] * lanes.step[l] * by_time[l];
+                    target[l] += RODAS4.gammas[stage] * lanes.step[l] * by_time[l];
                 }
             }
         }

@@ -81,7 +81,7 @@ pub enum Method {
     Zero,
     /// Explicit, with error control: Dormand–Prince 5(4).
     Explicit,
-    /// L-stable with error control: Rodas3, or Rodas4 for tolerances below 1e-5.
+    /// L-stable with error control: Rodas4.
     Rosenbrock,
 }
 

@@ -12,7 +12,7 @@ pub(super) fn lines(plan: &Plan) -> Vec<String> {
     let mut lines = Vec::new();
     if let Some(kinetics) = &chemistry.kinetics {
         lines.extend(kinetics.reactions.iter().map(|reaction| reaction_line(plan, kinetics, reaction)));
-        lines.push(method_line(kinetics.method, chemistry).to_owned());
+        lines.push(method_line(kinetics.method).to_owned());
         if has_error_control(kinetics.method) {
             lines.push(format!(
                 "tolerance {} relative, {}",
@@ -71,7 +71,7 @@ fn law_text(plan: &Plan, law: &Law) -> String {
     }
 }
 
-fn method_line(method: Method, chemistry: &Chemistry) -> &'static str {
+fn method_line(method: Method) -> &'static str {
     match method {
         Method::Observed => "first-order network: matrix exponential when observed, exact for any step",
         Method::Exponential => "first-order network: matrix exponential in each step, exact",
@@ -79,10 +79,7 @@ fn method_line(method: Method, chemistry: &Chemistry) -> &'static str {
         Method::Saturation => "one saturating reaction: closed form (Lambert W), exact",
         Method::Zero => "one reaction of order zero: closed form, to the end of its scarcest reactant",
         Method::Explicit => "not stiff: explicit, Dormand-Prince 5(4), sub-steps per particle",
-        Method::Rosenbrock if chemistry.tolerance < 1e-5 => {
-            "stiff: L-stable, Rodas4, exact Jacobian, sub-steps per particle"
-        }
-        Method::Rosenbrock => "stiff: L-stable, Rodas3, exact Jacobian, sub-steps per particle",
+        Method::Rosenbrock => "stiff: L-stable, Rodas4, exact Jacobian, sub-steps per particle",
     }
 }
 

@@ -1,6 +1,6 @@
 //! What is used up stays at zero, and what cannot be integrated is refused.
 
-use super::network::{Network, step, steps};
+use super::network::{Network, redox_chain, step, steps};
 use lamella::chemistry::Why;
 use lamella::maths::operator::{Binary, Unary};
 use lamella::plan::chemistry::Method;
@@ -25,6 +25,49 @@ fn monod_chains_are_exhausted() {
             assert!((y[0] + y[3] - 1.0).abs() < 1e-13, "{y:?}");
             assert!((y[3] - 2.0 * (0.3 - y[1]) - (2.0 - y[2])).abs() < 1e-13, "{y:?}");
         }
+    }
+}
+
+/// What is exhausted in the middle of a step is as right at its end as what is not; in the sub-step in which
+/// a value falls by decades, too. References: DOP853 at 1e-13, and Radau at 1e-12 (scipy 1.17).
+#[test]
+fn redox_chains_end_within_ten_tolerances() {
+    let start = [1.0, 0.05, 0.4, 0.8, 0.9];
+    let cases = [
+        (
+            3600.0,
+            [
+                0.9442916184729081,
+                0.014939345913740087,
+                0.3907201971883405,
+                0.7997737516762459,
+                0.9052458790175605,
+            ],
+        ),
+        (86_400.0, [0.338575200903601, 0.0, 9.113857025062828e-07, 0.7208592493371787, 0.9580731449015933]),
+        (864_000.0, [1.8e-15, 0.0, 0.0, 0.4500000000000022, 0.9178988506423585]),
+    ];
+    for (t, right) in cases {
+        for tolerance in [1e-4, 1e-6, 1e-8] {
+            for method in [Method::Rosenbrock, Method::Explicit] {
+                let (y, _) = step(&redox_chain().reactor(method, tolerance, 1e-6), &start, 0.0, t).unwrap();
+                for (found, right) in y.iter().zip(right) {
+                    let off = (found - right).abs() / (tolerance * right.max(1e-6));
+                    assert!(off <= 10.0, "{t} {tolerance} {method:?}: {off} tolerances off: {y:?}");
+                }
+            }
+        }
+    }
+}
+
+/// Falling by many decades takes few attempts: the size of sub-steps follows what they met.
+#[test]
+fn attempts_are_few_where_a_donor_runs_out() {
+    for (tolerance, most) in [(1e-4, 90), (1e-6, 250)] {
+        let reactor = redox_chain().reactor(Method::Rosenbrock, tolerance, 1e-6);
+        let (_, work) = step(&reactor, &[1.0, 0.05, 0.4, 0.8, 0.9], 0.0, 86_400.0).unwrap();
+        assert!(work.steps + work.rejected <= most, "{work:?}");
+        assert!(work.rejected * 8 <= work.steps, "{work:?}");
     }
 }
 

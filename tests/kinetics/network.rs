@@ -123,6 +123,27 @@ impl Network {
     }
 }
 
+/// Three acceptors that one donor and one biomass use after each other, each inhibited by the better ones.
+pub fn redox_chain() -> Network {
+    let mut network = Network::new(5);
+    for (acceptor, rate) in [(1, 2e-5), (2, 1e-5), (3, 5e-6)] {
+        let (donor, own, scale) = (network.monod(0, 0.1), network.monod(acceptor, 0.01), network.k(rate));
+        let biomass = network.c(4);
+        let mut rate = network.times(donor, own);
+        rate = network.times(rate, scale);
+        rate = network.times(rate, biomass);
+        for better in 1..acceptor {
+            let (c, k) = (network.c(better), network.k(0.02));
+            let sum = network.binary(Binary::Add, k, c);
+            let inhibition = network.binary(Binary::Divide, k, sum);
+            rate = network.times(rate, inhibition);
+        }
+        network.reaction(&[(0, -1.0), (acceptor, -0.8), (4, 0.1)], rate);
+    }
+    network.mass_action(1e-7, &[(4, 1.0)], &[(4, -1.0)]);
+    network
+}
+
 /// One particle from `t` over `dt`, without memory.
 pub fn step(reactor: &Reactor, y: &[f64], t: f64, dt: f64) -> Result<(Vec<f64>, Work), Failure> {
     let mut columns: Vec<Vec<f64>> = y.iter().map(|&value| vec![value]).collect();
