@@ -15,6 +15,7 @@ pub mod report;
 pub mod scenario;
 pub mod source;
 pub mod state;
+pub mod stop;
 pub mod stress;
 pub mod sweep;
 pub mod syntax;

@@ -14,6 +14,7 @@ const LAYERS: &[&[&str]] = &[
     &["flow"],
     &["chemistry"],
     &["engine"],
+    &["stop"],
     &["stress"],
     &["table"],
     &["measure"],

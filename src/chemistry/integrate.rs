@@ -115,6 +115,8 @@ pub(super) struct Task<'a, 'b> {
     pub work: Work,
     /// Particles that cannot be done, as they were, with the reason.
     pub failures: &'a mut Vec<Failure>,
+    /// Whether nothing after a failure counts. Those before it are under way, and may fail, too.
+    pub ends_at_failure: bool,
 }
 
 /// Takes all chosen particles over the step.
@@ -151,7 +153,8 @@ impl<S: Stepper> NullaryFnOnce for Run<'_, '_, '_, '_, S> {
         loop {
             let mut n_busy = 0;
             for l in 0..LANES {
-                if lanes.particle[l] == IDLE && next < n_chosen {
+                let is_over = task.ends_at_failure && !task.failures.is_empty();
+                if lanes.particle[l] == IDLE && next < n_chosen && !is_over {
                     let particle = task.chosen.map_or(next as u32, |chosen| chosen[next]);
                     load(network, lanes, task, l, particle);
                     next += 1;
@@ -292,7 +295,7 @@ fn conclude<S: Stepper>(
             || lanes.elapsed[l] + lanes.wanted[l] == lanes.elapsed[l]
             || lanes.wanted[l].partial_cmp(&(1e-40 * task.dt)) != Some(std::cmp::Ordering::Greater);
         if is_lost {
-            lose(lanes, task, l, step, S::MOST_STEPS);
+            lose(network, lanes, task, l, S::MOST_STEPS);
         }
         return;
     }
@@ -318,7 +321,7 @@ fn conclude<S: Stepper>(
     if is_last {
         finish(network, lanes, task, l);
     } else if lanes.count[l] >= S::MOST_STEPS {
-        lose(lanes, task, l, step, S::MOST_STEPS);
+        lose(network, lanes, task, l, S::MOST_STEPS);
     }
 }
 
@@ -342,16 +345,28 @@ fn finish(network: &Network, lanes: &mut Lanes, task: &mut Task<'_, '_>, l: usiz
 }
 
 /// Gives a particle up, as it was before the whole step.
-fn lose(lanes: &mut Lanes, task: &mut Task<'_, '_>, l: usize, step: f64, most: u32) {
+fn lose(network: &Network, lanes: &mut Lanes, task: &mut Task<'_, '_>, l: usize, most: u32) {
     let particle = lanes.particle[l] as usize;
+    let t = task.t + lanes.elapsed[l];
     let broken = lanes.slopes.iter().position(|slope| !slope[l].is_finite());
     let why = match broken {
         Some(component) => Why::NotFinite { component },
         None if lanes.count[l] >= most => {
-            Why::TooManySteps { t: task.t + lanes.elapsed[l], tried: lanes.count[l] }
+            Why::TooManySteps { t, tried: lanes.count[l], share: lanes.elapsed[l] / task.dt }
         }
-        None => Why::StepTooSmall { t: task.t + lanes.elapsed[l], step },
+        None => Why::StepTooSmall { component: worst(network, lanes, l), t, step: lanes.step[l] },
     };
     task.failures.push(Failure { particle, why });
     lanes.particle[l] = IDLE;
+}
+
+/// The component with the largest error; one whose value is no number before all others.
+fn worst(network: &Network, lanes: &Lanes, l: usize) -> usize {
+    let share = |i: usize| {
+        let size = network.small[i] + network.tolerance * lanes.y[i][l].abs().max(lanes.new[i][l].abs());
+        let share = (lanes.error[i][l] / size).abs();
+        if lanes.new[i][l].is_finite() && share.is_finite() { share } else { f64::INFINITY }
+    };
+    let larger = |found: usize, i: usize| if share(i) > share(found) { i } else { found };
+    (1..network.system.n_components).fold(0, larger)
 }

@@ -99,8 +99,9 @@ pub struct Failure {
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Why {
-    /// The error cannot be held with any step that time can resolve.
+    /// The error cannot be held with any step that time can resolve; that of `component` least of all.
     StepTooSmall {
+        component: usize,
         t: f64,
         step: f64,
     },
@@ -108,6 +109,8 @@ pub enum Why {
     TooManySteps {
         t: f64,
         tried: u32,
+        /// What was done of the step.
+        share: f64,
     },
     NotFinite {
         component: usize,
@@ -218,6 +221,7 @@ impl Reactor {
             chosen: None,
             work: Work::default(),
             failures,
+            ends_at_failure: !is_explicit,
         };
         if *is_explicit {
             integrate(self.width, network, &Explicit { network }, lanes, &mut task);
@@ -229,6 +233,7 @@ impl Reactor {
             left_over.extend(task.failures.drain(..).map(|failure| failure.particle as u32));
             left_over.sort_unstable();
             task.chosen = Some(left_over);
+            task.ends_at_failure = true;
         }
         integrate(self.width, network, &Rosenbrock { network, symbolic, aqueous }, lanes, &mut task);
         match task.failures.iter().min_by_key(|failure| failure.particle) {

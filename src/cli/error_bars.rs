@@ -9,6 +9,7 @@ use lamella::engine::snapshot::Snapshot;
 use lamella::engine::{self, RunError};
 use lamella::estimate::{self, Advice, Trials};
 use lamella::plan::Plan;
+use lamella::scenario::Scenario;
 use lamella::table::ErrorBarRow;
 use serde::Serialize;
 use std::time::Instant;
@@ -29,6 +30,7 @@ impl ErrorBars {
     /// Runs the trials one after the other.
     pub(crate) fn find(
         plan: &Plan,
+        scenario: &Scenario,
         n_axes: usize,
         snapshots: &[Snapshot],
         n_threads: usize,
@@ -54,7 +56,7 @@ impl ErrorBars {
             };
             let outcome = engine::run(&trial.plan, &settings, &watch, &mut sink);
             watch.progress.finish();
-            outcome.map_err(|error| run_failed(&error))?;
+            outcome.map_err(|error| run_failed(&error, scenario, plan))?;
             of_trials.push(seen);
         }
         let bars = estimate::bars(plan, &trials, snapshots, &of_trials)

@@ -14,10 +14,12 @@ use lamella::diagnostic::{Diagnostic, codes};
 use lamella::engine::snapshot::{Outcome, Snapshot, Values};
 use lamella::engine::{self, Control, RunError};
 use lamella::measure::{self, Evaluated};
+use lamella::plan::Plan;
 use lamella::plan::compile::{Compiled, Options};
 use lamella::report::{self, CRATE_FILE, Provenance, Start};
-use lamella::scenario::Settings;
+use lamella::scenario::{Scenario, Settings};
 use lamella::source::Sources;
+use lamella::stop;
 use lamella::table::{Record, Summary as Written, Swept, TableError, Writer};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -161,8 +163,16 @@ fn run_checked(mut checked: Checked, asked: Asked, terminal: &Terminal) -> Comma
         facts: facts::facts(asked.file.as_deref(), asked.n_threads),
         compile_wall,
         compiled,
+        scenario,
     };
-    job.run(terminal, &interrupt)
+    match job.run(terminal, &interrupt) {
+        // What has a place in the scene is shown with its lines.
+        Err(stopped) if stopped.message.primary_span().is_some() => {
+            terminal.diagnostics(&[*stopped.message], &checked.sources);
+            Ok(stopped.exit)
+        }
+        ended => ended,
+    }
 }
 
 /// What is about to happen, in one line.
@@ -180,6 +190,7 @@ fn announcement(compiled: &Compiled) -> String {
 /// A compiled scene with all that its run needs.
 struct Job {
     compiled: Compiled,
+    scenario: Scenario,
     record: Record,
     swept: Vec<Swept>,
     folder: PathBuf,
@@ -291,12 +302,14 @@ impl Job {
         let settings = engine::Settings { threads: Some(self.n_threads), ..engine::Settings::default() };
         let outcome = engine::run(plan, &settings, &watch, &mut sink);
         watch.progress.finish();
-        let outcome = outcome.map_err(|error| refusal.map_or_else(|| run_failed(&error), table_failed))?;
+        let outcome = outcome.map_err(|error| {
+            refusal.map_or_else(|| run_failed(&error, &self.scenario, plan), table_failed)
+        })?;
         let evaluated = measure::evaluate(plan, &self.compiled.evaluation, &snapshots, &outcome)
             .map_err(measuring_failed)?;
         let find_bars = || {
             let (n_axes, followed) = (self.record.n_axes, (terminal, &watch));
-            ErrorBars::find(plan, n_axes, &snapshots, self.n_threads, followed)
+            ErrorBars::find(plan, &self.scenario, n_axes, &snapshots, self.n_threads, followed)
         };
         let error_bars = self.wants_error_bars.then(find_bars).transpose()?;
         Ok(Found { outcome, snapshots, evaluated, error_bars, started })
@@ -338,49 +351,51 @@ fn measuring_failed(reason: String) -> Stopped {
     Stopped::new(Exit::Failed, Diagnostic::error(codes::R105, reason))
 }
 
-pub(super) fn run_failed(error: &RunError) -> Stopped {
-    let (exit, code) = match error {
-        RunError::Cancelled => (Exit::Interrupted, codes::R101),
-        RunError::NonFiniteInitial { .. }
-        | RunError::WrongInBin { .. }
-        | RunError::Chemistry { .. }
-        | RunError::NonFinitePosition { .. }
-        | RunError::NonFiniteConcentration { .. }
-        | RunError::NegativeConcentration { .. }
-        | RunError::NonFiniteOutput { .. }
-        | RunError::MassLost { .. } => (Exit::Failed, codes::R102),
-        RunError::OutOfMemory { .. } | RunError::Threads(_) => (Exit::Failed, codes::R103),
-        RunError::Plan(_) => (Exit::Failed, codes::R104),
-        RunError::Sink(_) => (Exit::Failed, codes::F103),
-    };
-    let message = Diagnostic::error(code, error.to_string());
-    let message = match error {
-        RunError::Cancelled => {
-            message.note("no table was written; the same scene gives the same bytes again")
-        }
-        _ => message,
-    };
-    Stopped::new(exit, message)
+pub(super) fn run_failed(error: &RunError, scenario: &Scenario, plan: &Plan) -> Stopped {
+    let exit = if *error == RunError::Cancelled { Exit::Interrupted } else { Exit::Failed };
+    Stopped::new(exit, stop::message(error, scenario, plan))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    const SCENE: &str = "lamella 1\nspecies A\ndomain line x = 0 m .. 1 m\nboundary left, right reflect\n\
+        initial A = 1 mol/L/m * x\nparticles fluid 1\nrun to 1 s, step 1 s\noutput total A at t = 1 s\n";
+
     #[test]
-    fn every_failure_of_a_run_has_its_code_and_exit() {
+    fn every_failure_of_a_run_has_its_code_exit_and_line() {
+        let sources = Sources::single("s.lam".to_owned(), SCENE.to_owned());
+        let checked = lamella::check(sources, &Settings::default(), &Options::default());
+        let (scenario, compiled) = (checked.scenario.expect("right"), checked.compiled.expect("right"));
         let of = |error: RunError| {
-            let stopped = run_failed(&error);
-            (stopped.message.code.0, stopped.exit)
+            let stopped = run_failed(&error, &scenario, &compiled.plan);
+            let line = stopped.message.primary_span().map(|span| checked.sources.line_column(span).0);
+            (stopped.message.code.0, stopped.exit, line)
         };
-        assert_eq!(of(RunError::Cancelled), ("R101", Exit::Interrupted));
-        assert_eq!(of(RunError::NonFinitePosition { step: 1, particle: 2 }), ("R102", Exit::Failed));
-        assert_eq!(of(RunError::OutOfMemory { bytes: 1 }), ("R103", Exit::Failed));
-        assert_eq!(of(RunError::Plan("two".to_owned())), ("R104", Exit::Failed));
-        assert_eq!(of(RunError::Sink("full".to_owned())), ("F103", Exit::Failed));
+        assert_eq!(of(RunError::Cancelled), ("R101", Exit::Interrupted, None));
+        let lost = RunError::NonFinitePosition { step: 1, particle: 2 };
+        assert_eq!(of(lost), ("R102", Exit::Failed, Some(7)));
+        assert_eq!(of(RunError::OutOfMemory { bytes: 1 }), ("R103", Exit::Failed, Some(6)));
+        assert_eq!(of(RunError::Plan("two".to_owned())), ("R104", Exit::Failed, None));
+        assert_eq!(of(RunError::Sink("full".to_owned())), ("F103", Exit::Failed, None));
         let kind = lamella::plan::OutputKind::Total;
         let overflow = RunError::NonFiniteOutput { t: 1.0, kind, quantity: "A".to_owned() };
-        assert_eq!(of(overflow), ("R102", Exit::Failed));
+        assert_eq!(of(overflow), ("R102", Exit::Failed, Some(8)));
+        let below = |step| RunError::NegativeConcentration {
+            step,
+            particle: 0,
+            component: "A".to_owned(),
+            value: -1.0,
+        };
+        assert_eq!(of(below(0)), ("R102", Exit::Failed, Some(5)));
+        assert_eq!(of(below(1)), ("R102", Exit::Failed, Some(2)));
+        let why = lamella::chemistry::Why::TooManySteps { t: 0.1, tried: 7, share: 0.1 };
+        let slow = RunError::Chemistry { step: 1, particle: 0, what: "slow".to_owned(), why };
+        assert_eq!(of(slow), ("R106", Exit::Failed, Some(7)));
+        let why = lamella::chemistry::Why::NotFinite { component: 0 };
+        let wild = RunError::Chemistry { step: 1, particle: 0, what: "wild".to_owned(), why };
+        assert_eq!(of(wild), ("R107", Exit::Failed, Some(2)));
         let stopped = measuring_failed("The measure `m` has no value.".to_owned());
         assert_eq!((stopped.message.code.0, stopped.exit), ("R105", Exit::Failed));
     }

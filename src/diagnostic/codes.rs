@@ -72,6 +72,8 @@ codes! {
     R103 "the machine cannot give what the run needs",
     R104 "the plan contradicts itself",
     R105 "a result cannot be compared or measured",
+    R106 "a step needs more sub-steps than it may take",
+    R107 "reactions cannot be taken over a step",
     P001 "the command line sets a parameter that the scene does not have",
     P002 "a parameter lies outside of its range",
     D001 "two parameters of a function have one name",

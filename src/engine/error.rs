@@ -1,8 +1,9 @@
 //! What can stop a run, in words that name the step, the particle and the component.
 //!
-//! Owns the run's errors. May use the numbers of `diagnostic` and the kinds of outputs. It deliberately holds no spans: a plan
-//! has none.
+//! Owns the run's errors. May use the numbers of `diagnostic`, the kinds of outputs and the
+//! reasons of `chemistry`. It deliberately holds no spans: a plan has none, and `crate::stop` finds them.
 
+use crate::chemistry::Why;
 use crate::diagnostic::precise;
 use crate::plan::OutputKind;
 use std::fmt;
@@ -33,6 +34,7 @@ pub enum RunError {
         step: u64,
         particle: u64,
         what: String,
+        why: Why,
     },
     NonFiniteConcentration {
         step: u64,
@@ -82,7 +84,7 @@ impl fmt::Display for RunError {
                 place(position),
                 precise(*value)
             ),
-            Self::Chemistry { step, particle, what } => {
+            Self::Chemistry { step, particle, what, .. } => {
                 write!(f, "step {step}: the chemistry of particle {particle} cannot be solved: {what}")
             }
             Self::NonFinitePosition { step, particle } => {

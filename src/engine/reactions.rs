@@ -208,15 +208,15 @@ impl Reactions {
     pub fn explain<const D: usize>(&self, program: &Program<D>, why: Why) -> String {
         let name = |idx: usize| program.plan.components.get(idx).map_or("?", |component| &component.name);
         match why {
-            Why::StepTooSmall { t, step } => format!(
-                "at {} s a sub-step of {} s is still too long for the tolerance",
+            Why::StepTooSmall { component, t, step } => format!(
+                "at {} s a sub-step of {} s is still too long for `{}`",
                 precise(t),
-                precise(step)
+                precise(step),
+                name(component)
             ),
-            Why::TooManySteps { t, tried } => format!(
-                "{tried} sub-steps, the most that one step may take, end at {} s; shorter steps allow more",
-                precise(t)
-            ),
+            Why::TooManySteps { t, tried, .. } => {
+                format!("{tried} sub-steps, the most that one step may take, end at {} s", precise(t))
+            }
             Why::NotFinite { component } => {
                 format!("the rate of `{}` is not a finite number", name(component))
             }
@@ -312,7 +312,8 @@ impl<const D: usize> Run<'_, D> {
             };
             if let Err(failure) = reactor.react(batch, &mut scratch) {
                 let what = format!("in a bin without particles: {}", reactions.explain(program, failure.why));
-                return Err(RunError::Chemistry { step: step.max(1), particle: 0, what });
+                let why = failure.why;
+                return Err(RunError::Chemistry { step: step.max(1), particle: 0, what, why });
             }
         }
         let mean = program.plan.particles.count as f64 / n_bins as f64;

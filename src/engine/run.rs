@@ -334,7 +334,7 @@ impl<'a, const D: usize> Run<'a, D> {
             Trouble::Chemistry { particle, why } => {
                 // What reacts does so over the step before.
                 let what = self.reactions.explain(&self.program, why);
-                RunError::Chemistry { step: step.max(1), particle, what }
+                RunError::Chemistry { step: step.max(1), particle, what, why }
             }
             Trouble::Negative { component, first } => {
                 let (particle, value) = self.find_below(component, first);

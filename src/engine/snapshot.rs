@@ -34,11 +34,11 @@ impl Values {
     /// The first column with a value beyond all numbers. What is undefined, as the mean of an empty bin,
     /// is no overflow.
     pub fn overflow(&self) -> Option<usize> {
-        let has_infinite = |columns: &[Vec<f64>]| {
-            columns.iter().position(|column| column.iter().any(|value| value.is_infinite()))
-        };
         match self {
-            Self::Binned { mean, .. } => has_infinite(mean),
+            Self::Binned { mean, n_particles, .. } => mean.iter().position(|column| {
+                let mut bins = column.iter().zip(n_particles);
+                bins.any(|(value, &n)| value.is_infinite() || (n > 0 && value.is_nan()))
+            }),
             Self::Covariance { covariance, n_particles } => covariance.iter().position(|column| {
                 column.iter().zip(n_particles).any(|(value, &n)| n > 1 && !value.is_finite())
             }),
@@ -46,7 +46,9 @@ impl Values {
             Self::Mixing(states) => states.iter().position(|state| {
                 [state.m, state.m_mean, state.m_cov].iter().any(|value| value.is_infinite())
             }),
-            Self::Particles { concentrations, .. } => has_infinite(concentrations),
+            Self::Particles { concentrations, .. } => {
+                concentrations.iter().position(|column| column.iter().any(|value| !value.is_finite()))
+            }
         }
     }
 }

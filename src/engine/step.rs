@@ -88,6 +88,10 @@ impl<const D: usize> pulp::NullaryFnOnce for OnBlock<'_, D> {
         let program = pass.program;
         let mut columns = std::mem::take(&mut block.columns);
         for (chunk_idx, range) in block.chunks().enumerate() {
+            if trouble.is_some() {
+                // Only the first counts, and what fails may take long.
+                break;
+            }
             let n = range.len();
             let first = block.first() + range.start as u64;
             let slots = &mut scratch.slots[..n];

@@ -205,7 +205,7 @@ fn exchange(scenario: &Scenario, plan: &Plan, limits: &mut Vec<Limit>, diagnosti
 }
 
 /// A step of two figures, not above the given one, as text of the language.
-fn round_down(seconds: f64) -> String {
+pub(crate) fn round_down(seconds: f64) -> String {
     format!("{} s", number(rounded(seconds, 2, -1)))
 }
 
@@ -215,7 +215,7 @@ fn short_up(value: f64) -> String {
 }
 
 /// Three figures are enough for a message.
-pub(super) fn short(value: f64) -> String {
+pub(crate) fn short(value: f64) -> String {
     number(rounded(value, 3, 0))
 }
 

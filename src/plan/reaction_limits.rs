@@ -137,11 +137,7 @@ fn splitting(
         .help(format!("use `step {} s` or less, or `chemistry order 2`", short(needed)));
     let name =
         plan.chemistry.as_ref().and_then(|c| c.kinetics.as_ref()).map(|k| &k.reactions[scales.fastest].name);
-    let written = name.and_then(|name| {
-        let own = name.split('.').next().unwrap_or(name);
-        scenario.reactions.iter().find(|reaction| reaction.name == *name || reaction.name == own)
-    });
-    if let Some(reaction) = written {
+    if let Some(reaction) = name.and_then(|name| scenario.reaction(name)) {
         message = message.also(reaction.span, format!("the fastest reaction: 1/k = {} s", short(1.0 / rate)));
     }
     diagnostics.push(message);

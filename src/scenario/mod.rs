@@ -41,6 +41,7 @@ pub use choice::{Activity, Integrator, OutputKind, Placement, Side, Splitting};
 pub use collect::resolve;
 pub use geometry::MAX_BINS;
 pub use measure::{Fact, Field, FieldTarget, Norm, Scalar};
+pub use model::MAX_STEPS;
 pub use places::SAME_TIME;
 pub use used::{MAX_USES, Used, Uses, resolve_all, sweeps, wanted_files};
 
@@ -88,6 +89,13 @@ pub struct Scenario {
 }
 
 impl Scenario {
+    /// The reaction of a plan as it is written: one that goes both ways is two in a plan.
+    pub fn reaction(&self, name: &str) -> Option<&Reaction> {
+        let own = name.split('.').next().unwrap_or(name);
+        let named = |name: &str| self.reactions.iter().find(|reaction| reaction.name == name);
+        named(name).or_else(|| named(own))
+    }
+
     /// Whether fluid, frame or exchange between zones could carry anything away from where it is.
     pub fn has_transport(&self) -> bool {
         let flows = self.flow.as_ref().is_some_and(|flow| flow.value.iter().any(|v| *v != 0.0));

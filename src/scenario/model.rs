@@ -16,6 +16,9 @@ use crate::units::Dimension;
 /// Particles that a plan may name at all; memory is checked against the machine later.
 pub(super) const MAX_PARTICLES: f64 = 1e11;
 
+/// Steps that a run may have.
+pub const MAX_STEPS: f64 = 1e12;
+
 /// The species so far; some may be wrong while the rest is still checked.
 pub(super) struct SpeciesList {
     pub list: Vec<Option<Species>>,
@@ -276,7 +279,7 @@ pub(super) fn run<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) ->
     }
     let (duration, step) = (duration?, step?);
     let n_steps = duration.value / step.value;
-    if n_steps > 1e12 {
+    if n_steps > MAX_STEPS {
         checker.report(
             Diagnostic::error(M005, "the run would have too many steps")
                 .at(step.span, format!("{n_steps:.3e} steps"))

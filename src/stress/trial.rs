@@ -9,6 +9,7 @@ use crate::engine::{Control, RunError, Settings, run};
 use crate::plan::Plan;
 use crate::plan::compile::{Compiled, Options, compile_edited};
 use crate::scenario::Scenario;
+use crate::stop;
 use std::time::{Duration, Instant};
 
 /// A tolerance this much tighter tells the error of the one that is asked for.
@@ -61,9 +62,9 @@ impl Fate {
 pub struct Verdict {
     pub trial: Trial,
     pub fate: Fate,
-    /// What refused it, with its place.
+    /// What refused or stopped it, with its place.
     pub message: Option<Diagnostic>,
-    /// What stopped it, or why it was not run.
+    /// Why it was not run, or not to its end.
     pub reason: Option<String>,
     pub wall: f64,
     pub cpu: f64,
@@ -111,7 +112,7 @@ impl Trial {
             verdict.reason = Some(format!("not run: about {:.1e} s", compiled.cost.cpu_seconds));
             return verdict;
         }
-        verdict.take(&compiled, bounds);
+        verdict.take(scenario, &compiled, bounds);
         verdict
     }
 }
@@ -149,7 +150,7 @@ impl Verdict {
         }
     }
 
-    fn take(&mut self, compiled: &Compiled, bounds: &Bounds) {
+    fn take(&mut self, scenario: &Scenario, compiled: &Compiled, bounds: &Bounds) {
         let begin = Instant::now();
         let result = finish(&compiled.plan, bounds.time);
         self.wall = begin.elapsed().as_secs_f64();
@@ -162,7 +163,7 @@ impl Verdict {
             }
             Err(error) => {
                 self.fate = Fate::Stopped;
-                self.reason = Some(error.to_string());
+                self.message = Some(stop::message(&error, scenario, &compiled.plan));
                 return;
             }
         };

@@ -14,6 +14,7 @@ use crate::plan::evaluation::Evaluation;
 use crate::plan::{NUMERICS_VERSION, Plan};
 use crate::report;
 use crate::scenario::Scenario;
+use crate::stop;
 use crate::table::{ErrorRow, PointRow, Status, Value};
 use std::time::Instant;
 
@@ -62,7 +63,13 @@ impl Task<'_> {
         let outcome = match outcome {
             Ok(outcome) => Ok(outcome),
             Err(RunError::Cancelled) => return None,
-            Err(error) => Err((code_of(&error), error.to_string())),
+            Err(error) => {
+                let message = stop::message(&error, self.scenario, &self.plan);
+                // What would work stands with what is wrong: the row has no place for more.
+                let help = message.help.iter().take(1).cloned();
+                let text: Vec<String> = std::iter::once(message.message).chain(help).collect();
+                Err((message.code.0.to_owned(), text.join("; ")))
+            }
         };
         let found = outcome.and_then(|outcome| {
             let evaluated = evaluate(self.compiled, &snapshots, &outcome)?;
@@ -146,17 +153,6 @@ fn fill(row: &mut PointRow, outcome: &Outcome) {
     row.steps = outcome.n_steps;
     row.sub_steps = outcome.sub_steps();
     row.mass_defect = (!outcome.mass_defect.is_empty()).then(|| outcome.worst_defect());
-}
-
-fn code_of(error: &RunError) -> String {
-    let code = match error {
-        RunError::OutOfMemory { .. } | RunError::Threads(_) => codes::R103,
-        RunError::Plan(_) => codes::R104,
-        RunError::Sink(_) => codes::F103,
-        RunError::Cancelled => codes::R101,
-        _ => codes::R102,
-    };
-    code.0.to_owned()
 }
 
 fn evaluate(

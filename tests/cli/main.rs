@@ -7,5 +7,6 @@ mod overhead;
 mod program;
 mod runs;
 mod scenes;
+mod stops;
 mod stress;
 mod used;

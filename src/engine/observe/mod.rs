@@ -58,7 +58,7 @@ pub fn observe<const D: usize>(
     let values = sum(run, instant, &means, &needs, &tallies);
     if let Some((particle, why)) = run.reactions.speciation.as_ref().and_then(Speciation::failure) {
         let what = run.reactions.explain(program, why);
-        return Err(RunError::Chemistry { step: due.steps, particle, what });
+        return Err(RunError::Chemistry { step: due.steps, particle, what, why });
     }
     let snapshot = |(&output_idx, values)| {
         let output = &program.plan.outputs[output_idx];
