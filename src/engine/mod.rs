@@ -22,6 +22,7 @@ mod schedule;
 mod sides;
 pub mod snapshot;
 mod step;
+pub mod track;
 mod walk;
 
 use crate::plan::Plan;

@@ -49,6 +49,31 @@ pub fn draw_each(key: &[u32; 8], stream: u64, counters: &[u64; LANES], words: &m
     blocks(key, stream, |lane| (counters[lane] as u32, (counters[lane] >> 32) as u32), words);
 }
 
+/// The sixteen words of one cipher block.
+pub fn block(key: &[u32; 8], stream: u64, counter: u64) -> [u32; 16] {
+    let [mut x0, mut x1, mut x2, mut x3] = CONSTANTS;
+    let [mut x4, mut x5, mut x6, mut x7, mut x8, mut x9, mut x10, mut x11] = *key;
+    let last = [counter as u32, (counter >> 32) as u32, stream as u32, (stream >> 32) as u32];
+    let [mut x12, mut x13, mut x14, mut x15] = last;
+    for _ in 0..4 {
+        quarter_round!(x0, x4, x8, x12);
+        quarter_round!(x1, x5, x9, x13);
+        quarter_round!(x2, x6, x10, x14);
+        quarter_round!(x3, x7, x11, x15);
+        quarter_round!(x0, x5, x10, x15);
+        quarter_round!(x1, x6, x11, x12);
+        quarter_round!(x2, x7, x8, x13);
+        quarter_round!(x3, x4, x9, x14);
+    }
+    let mixed = [x0, x1, x2, x3, x4, x5, x6, x7, x8, x9, x10, x11, x12, x13, x14, x15];
+    let start = |idx: usize| match idx {
+        0..4 => CONSTANTS[idx],
+        4..12 => key[idx - 4],
+        _ => last[idx - 12],
+    };
+    std::array::from_fn(|idx| mixed[idx].wrapping_add(start(idx)))
+}
+
 /// One cipher block per lane.
 #[inline(always)]
 fn blocks(key: &[u32; 8], stream: u64, counter: impl Fn(usize) -> (u32, u32), words: &mut Words) {
@@ -135,6 +160,10 @@ mod tests {
         draw(&KEY, 7, 3, &mut together);
         draw_each(&KEY, 7, &counters, &mut each);
         assert_eq!(together, each);
+        for (lane, &counter) in counters.iter().enumerate() {
+            let single: Vec<u32> = each.iter().skip(lane).step_by(LANES).copied().collect();
+            assert_eq!(block(&KEY, 7, counter)[..], single);
+        }
         draw_each(&KEY, 7, &[u64::MAX; LANES], &mut each);
         assert!(each.chunks(LANES).all(|row| row.iter().all(|word| *word == row[0])));
     }

@@ -3,7 +3,7 @@
 //! Owns the derivation of keys and the numbering of draws. May use `maths`. It deliberately has no
 //! state: leaving out a purpose, a step or a block shifts no other draw.
 
-use crate::maths::chacha::{self, DRAW, Words};
+use crate::maths::chacha::{self, DRAW, LANES, Words};
 use crate::maths::normal::{self, uniform_53};
 use crate::maths::wide::Width;
 use pulp::NullaryFnOnce;
@@ -15,6 +15,12 @@ pub enum Purpose {
     Walk,
     /// Positions at times between two steps.
     Bridge,
+    /// Walks whose numbers belong to particles.
+    Track,
+    /// What single particles meet on such a walk.
+    Wall,
+    /// New particles.
+    Release,
 }
 
 /// The generator of one purpose under one root seed.
@@ -30,6 +36,9 @@ impl Stream {
             Purpose::Placement => "placement",
             Purpose::Walk => "walk",
             Purpose::Bridge => "bridge",
+            Purpose::Track => "track",
+            Purpose::Wall => "wall",
+            Purpose::Release => "release",
         };
         let mut hasher = blake3::Hasher::new();
         hasher.update(b"lamella random stream 1\0");
@@ -63,6 +72,39 @@ impl Stream {
         normal::double(&high, &low, normals);
     }
 
+    /// Sixteen normal numbers for each of 64 particles in 32-bit arithmetic, a row of 64 per number.
+    pub fn single_normals_each(
+        &self,
+        width: Width,
+        particles: &[u64; LANES],
+        number: u64,
+        normals: &mut [f64; DRAW],
+    ) {
+        let mut words = [0; DRAW];
+        width.run(DrawEach { key: &self.key, particles, number, words: &mut words });
+        width.run(Single { words: &words, normals });
+    }
+
+    /// The same in 64-bit arithmetic, from draws `2·number` and `2·number + 1`.
+    pub fn double_normals_each(
+        &self,
+        width: Width,
+        particles: &[u64; LANES],
+        number: u64,
+        normals: &mut [f64; DRAW],
+    ) {
+        let (mut high, mut low) = ([0; DRAW], [0; DRAW]);
+        width.run(DrawEach { key: &self.key, particles, number: 2 * number, words: &mut high });
+        width.run(DrawEach { key: &self.key, particles, number: 2 * number + 1, words: &mut low });
+        normal::double(&high, &low, normals);
+    }
+
+    /// Eight uniform numbers in (0, 1) of one particle.
+    pub fn uniforms_of(&self, particle: u64, number: u64) -> [f64; 8] {
+        let words = chacha::block(&self.key, number, particle);
+        std::array::from_fn(|idx| uniform_53(words[2 * idx], words[2 * idx + 1]))
+    }
+
     /// Uniform numbers in (0, 1) with 53 bits from the two draws `2·number` and `2·number + 1`.
     pub fn uniforms(&self, width: Width, block_idx: u64, number: u64, uniforms: &mut [f64; DRAW]) {
         let (mut high, mut low) = ([0; DRAW], [0; DRAW]);
@@ -87,6 +129,22 @@ impl NullaryFnOnce for Draw<'_> {
     #[inline(always)]
     fn call(self) {
         chacha::draw(self.key, self.block_idx, self.number, self.words);
+    }
+}
+
+struct DrawEach<'a> {
+    key: &'a [u32; 8],
+    particles: &'a [u64; LANES],
+    number: u64,
+    words: &'a mut Words,
+}
+
+impl NullaryFnOnce for DrawEach<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        chacha::draw_each(self.key, self.number, self.particles, self.words);
     }
 }
 
@@ -119,6 +177,34 @@ mod tests {
         assert_ne!(reference, first(42, Purpose::Bridge, 0));
         assert_ne!(reference, first(43, Purpose::Walk, 0));
         assert_ne!(reference, first(42, Purpose::Walk, 1));
+    }
+
+    /// The numbers of a particle are its own: they do not change with its neighbours or its lane.
+    #[test]
+    fn normals_of_a_particle_stay_with_it() {
+        let stream = Stream::new(42, Purpose::Track);
+        let particles: [u64; LANES] = std::array::from_fn(|lane| 1000 + lane as u64);
+        let mut turned = particles;
+        turned.reverse();
+        for is_double in [false, true] {
+            let draw = |particles: &[u64; LANES]| {
+                let mut normals = [0.0; DRAW];
+                if is_double {
+                    stream.double_normals_each(Width::widest(), particles, 7, &mut normals);
+                } else {
+                    stream.single_normals_each(Width::baseline(), particles, 7, &mut normals);
+                }
+                normals
+            };
+            let (straight, reversed) = (draw(&particles), draw(&turned));
+            for row in 0..DRAW / LANES {
+                for lane in 0..LANES {
+                    assert_eq!(straight[row * LANES + lane], reversed[row * LANES + LANES - 1 - lane]);
+                }
+            }
+        }
+        let (one, other) = (stream.uniforms_of(5, 3), stream.uniforms_of(6, 3));
+        assert!(one.iter().zip(other).all(|(a, b)| *a > 0.0 && *a < 1.0 && *a != b));
     }
 
     #[test]

@@ -1,0 +1,389 @@
+//! Velocities on rectilinear cells: linear between faces for the drift, between corners for dispersion.
+//!
+//! Owns the interpolation of one flow. May use `flow` and lanes. It deliberately keeps velocities in 32 bits:
+//! six parts in 1e8 of a velocity, and half the memory.
+
+#![allow(clippy::needless_range_loop)] // Loops over lanes are hot, and zips of many arrays hard to read.
+
+use super::lanes::{LANES, Lane, Narrow};
+use super::medium::{Carrier, Criteria, Leap, Medium};
+use crate::flow::FaceFlow;
+
+/// Corners of a cell in three dimensions.
+const CORNERS: usize = 8;
+
+/// Dispersivities, m, and molecular diffusion, m²/s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Dispersivity {
+    pub longitudinal: f64,
+    pub transverse: f64,
+    pub molecular: f64,
+}
+
+/// A flow on cells with equal porosity.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CellMedium<const D: usize> {
+    ruler: [Ruler; D],
+    /// Pore velocity through the faces normal to each axis, m/s.
+    faces: [Vec<f32>; D],
+    /// Pore velocity at the corners, component by component, m/s.
+    corners: Vec<[f32; D]>,
+    face_strides: [[usize; D]; D],
+    corner_strides: [usize; D],
+    dispersivity: Dispersivity,
+}
+
+/// Edges along one axis.
+#[derive(Debug, Clone, PartialEq)]
+struct Ruler {
+    low: f64,
+    inverse_width: f64,
+    n: usize,
+}
+
+/// Coefficients of 64 particles.
+#[derive(Debug, Clone)]
+pub struct Look<const D: usize> {
+    /// m/s
+    drift: [Narrow; D],
+    /// √(2 D_L), √(2 D_T), m/√s
+    along: Narrow,
+    across: Narrow,
+    /// Unit vector of the velocity.
+    direction: [Narrow; D],
+    /// Pore velocity of the faces, over R, m/s.
+    speed: [Narrow; D],
+    around: Around<D>,
+    /// Per component and axis the gradient, while it is worked out.
+    slopes: [[[Narrow; CORNERS / 2]; D]; D],
+}
+
+impl<const D: usize> CellMedium<D> {
+    /// From the flow over the axes `axes` of the scene. `None` if cells are not equal along an axis, or if the
+    /// porosity is not the same everywhere.
+    pub fn new(flow: &FaceFlow, axes: [usize; D], dispersivity: Dispersivity) -> Option<Self> {
+        let porosity = *flow.porosity.first()?;
+        let is_even = flow.porosity.iter().all(|other| *other == porosity);
+        let n = axes.map(|axis| flow.cells.n()[axis]);
+        let mut ruler = Vec::with_capacity(D);
+        for axis in axes {
+            ruler.push(Ruler::new(&flow.cells.edges()[axis])?);
+        }
+        let ruler: [Ruler; D] = ruler.try_into().ok()?;
+        if !is_even || porosity <= 0.0 {
+            return None;
+        }
+        let faces = axes.map(|axis| flow.flux[axis].iter().map(|q| (q / porosity) as f32).collect());
+        let face_strides = std::array::from_fn(|axis| {
+            let mut n = n;
+            n[axis] += 1;
+            strides(n)
+        });
+        let corner_strides = strides(n.map(|n| n + 1));
+        let mut medium =
+            Self { ruler, faces, corners: Vec::new(), face_strides, corner_strides, dispersivity };
+        medium.corners = medium.corner_velocities();
+        Some(medium)
+    }
+
+    /// Mean over the faces that touch a corner; they all have the same area.
+    fn corner_velocities(&self) -> Vec<[f32; D]> {
+        let n = self.ruler.each_ref().map(|ruler| ruler.n + 1);
+        let n_corners: usize = n.iter().product();
+        let corner = |idx: usize| {
+            let mut rest = idx;
+            let mut place = [0; D];
+            for axis in (0..D).rev() {
+                place[axis] = rest % n[axis];
+                rest /= n[axis];
+            }
+            std::array::from_fn(|axis| self.corner_velocity(place, axis))
+        };
+        (0..n_corners).map(corner).collect()
+    }
+
+    fn corner_velocity(&self, place: [usize; D], axis: usize) -> f32 {
+        let (mut sum, mut count) = (0.0, 0.0);
+        for choice in 0..1_usize << D {
+            // The faces normal to the axis lie at the corner along it, on either side along the others.
+            let side = |other: usize| choice >> other & 1;
+            if side(axis) == 1 {
+                continue;
+            }
+            let along = |other: usize| match other == axis {
+                true => Some(place[other]),
+                false => (place[other] + side(other)).checked_sub(1).filter(|&k| k < self.ruler[other].n),
+            };
+            let face: Option<usize> =
+                (0..D).map(|other| Some(along(other)? * self.face_strides[axis][other])).sum();
+            if let Some(face) = face {
+                sum += f64::from(self.faces[axis][face]);
+                count += 1.0;
+            }
+        }
+        (sum / count) as f32
+    }
+
+    /// Velocities around each place: two faces per axis, and all corners.
+    #[inline(always)]
+    fn gather(&self, positions: &[Lane; D], around: &mut Around<D>) {
+        for axis in 0..D {
+            let ruler = &self.ruler[axis];
+            let last = (ruler.n - 1) as f64;
+            for lane in 0..LANES {
+                let along = (positions[axis][lane] - ruler.low) * ruler.inverse_width;
+                let floor = floor(along, last);
+                around.fraction[axis][lane] = (along - floor).clamp(0.0, 1.0) as f32;
+                around.place[axis][lane] = floor as i32;
+            }
+        }
+        for lane in 0..LANES {
+            let place: [usize; D] = std::array::from_fn(|axis| around.place[axis][lane] as usize);
+            for axis in 0..D {
+                let mut face = 0;
+                for other in 0..D {
+                    face += place[other] * self.face_strides[axis][other];
+                }
+                around.faces[axis][0][lane] = self.faces[axis][face];
+                around.faces[axis][1][lane] = self.faces[axis][face + self.face_strides[axis][axis]];
+            }
+            let mut corner = 0;
+            for axis in 0..D {
+                corner += place[axis] * self.corner_strides[axis];
+            }
+            for row in 0..1_usize << (D - 1) {
+                let mut first = corner;
+                for axis in 0..D - 1 {
+                    first += (row >> (D - 2 - axis) & 1) * self.corner_strides[axis];
+                }
+                let pair = &self.corners[first..first + 2];
+                for axis in 0..D {
+                    around.corners[2 * row][axis][lane] = pair[0][axis];
+                    around.corners[2 * row + 1][axis][lane] = pair[1][axis];
+                }
+            }
+        }
+    }
+}
+
+/// Largest whole number not above `x`, within `0 … last`.
+#[inline(always)]
+fn floor(x: f64, last: f64) -> f64 {
+    let x = if x > 0.0 { x } else { 0.0 };
+    let x = if x < last + 0.5 { x } else { last };
+    const SHIFT: f64 = 4_503_599_627_370_496.0;
+    let nearest = (x + SHIFT) - SHIFT;
+    let floor = if nearest > x { nearest - 1.0 } else { nearest };
+    if floor < last { floor } else { last }
+}
+
+fn strides<const D: usize>(n: [usize; D]) -> [usize; D] {
+    let mut strides = [1; D];
+    for axis in (0..D.saturating_sub(1)).rev() {
+        strides[axis] = strides[axis + 1] * n[axis + 1];
+    }
+    strides
+}
+
+impl Ruler {
+    fn new(edges: &[f64]) -> Option<Self> {
+        let (&low, &high) = (edges.first()?, edges.last()?);
+        let n = edges.len() - 1;
+        let width = (high - low) / n as f64;
+        let is_even = |(idx, edge): (usize, &f64)| (edge - low - width * idx as f64).abs() <= 1e-9 * width;
+        edges.iter().enumerate().all(is_even).then_some(Self { low, inverse_width: 1.0 / width, n })
+    }
+}
+
+/// What lies around 64 places.
+#[derive(Debug, Clone)]
+struct Around<const D: usize> {
+    place: [[i32; LANES]; D],
+    fraction: [Narrow; D],
+    /// Per axis the lower and the upper face.
+    faces: [[Narrow; 2]; D],
+    /// Per corner (last axis fastest) and component.
+    corners: [[Narrow; D]; CORNERS],
+}
+
+impl<const D: usize> Around<D> {
+    #[inline(always)]
+    fn new() -> Self {
+        Self {
+            place: [[0; LANES]; D],
+            fraction: [[0.0; LANES]; D],
+            faces: [[[0.0; LANES]; 2]; D],
+            corners: [[[0.0; LANES]; D]; CORNERS],
+        }
+    }
+
+    /// One component between the corners, and its gradient. The corners are used up.
+    ///
+    /// - Equation: multilinear interpolation, one axis after the other from the last.
+    /// - Symbols: fractions of the cell along each axis; gradients over `1 / inverse_width`.
+    /// - Range: fractions from 0 to 1.
+    /// - Source: methods, section 1.3 (LaBolle et al. 1996, doi:10.1029/95WR03528).
+    /// - Shape: 64 lanes, one loop over them for each pair of corners.
+    #[inline(always)]
+    fn between(
+        &mut self,
+        component: usize,
+        inverse_width: &[f32; D],
+        slopes: &mut [[Narrow; CORNERS / 2]; D],
+    ) {
+        for axis in (0..D).rev() {
+            let u = &self.fraction[axis];
+            let scale = inverse_width[axis];
+            for k in 0..1_usize << axis {
+                for other in axis + 1..D {
+                    for lane in 0..LANES {
+                        let (low, high) = (slopes[other][2 * k][lane], slopes[other][2 * k + 1][lane]);
+                        slopes[other][k][lane] = low + u[lane] * (high - low);
+                    }
+                }
+                for lane in 0..LANES {
+                    let (low, high) =
+                        (self.corners[2 * k][component][lane], self.corners[2 * k + 1][component][lane]);
+                    let step = high - low;
+                    slopes[axis][k][lane] = step * scale;
+                    self.corners[k][component][lane] = low + u[lane] * step;
+                }
+            }
+        }
+    }
+}
+
+impl<const D: usize> Medium<D> for CellMedium<D> {
+    type Look = Look<D>;
+
+    fn blank(&self) -> Look<D> {
+        Look {
+            drift: [[0.0; LANES]; D],
+            along: [0.0; LANES],
+            across: [0.0; LANES],
+            direction: [[0.0; LANES]; D],
+            speed: [[0.0; LANES]; D],
+            around: Around::new(),
+            slopes: [[[[0.0; LANES]; CORNERS / 2]; D]; D],
+        }
+    }
+
+    /// Coefficients of a displacement.
+    ///
+    /// - Equation: `A = (v + ∇·D)/R`,
+    ///   `(∇·D)_i = α_T ∂_i V + (α_L − α_T) [Σ_j (v_j ∂_j v_i + v_i ∂_j v_j)/V − Σ_j v_i v_j ∂_j V/V²]`.
+    /// - Symbols: `v` between faces in the drift, between corners in `D`; `V = |v|`, `∂_i V = Σ_k v_k ∂_i v_k/V`.
+    /// - Range: any velocity; where it is zero only molecular diffusion is left.
+    /// - Source: methods, sections 1.2 and 1.3 (Salamon et al. 2006, doi:10.1016/j.jconhyd.2006.05.005).
+    /// - Shape: 64 particles.
+    #[inline(always)]
+    fn look(&self, carrier: &Carrier, positions: &[Lane; D], look: &mut Look<D>) {
+        let Look { around, slopes, .. } = look;
+        self.gather(positions, around);
+        let mobility = carrier.mobility as f32;
+        let along = self.dispersivity.longitudinal as f32;
+        let across = self.dispersivity.transverse as f32;
+        let molecular = carrier.molecular.unwrap_or(self.dispersivity.molecular) as f32;
+        let inverse_width: [f32; D] = std::array::from_fn(|axis| self.ruler[axis].inverse_width as f32);
+        for component in 0..D {
+            around.between(component, &inverse_width, &mut slopes[component]);
+        }
+        let mut speed = [0.0_f32; LANES];
+        for lane in 0..LANES {
+            let mut square = f32::MIN_POSITIVE;
+            for i in 0..D {
+                let v = around.corners[0][i][lane];
+                square += v * v;
+            }
+            speed[lane] = square.sqrt();
+            let inverse = 1.0 / speed[lane];
+            for i in 0..D {
+                look.direction[i][lane] = around.corners[0][i][lane] * inverse;
+            }
+            look.along[lane] = (2.0 * mobility * (along * speed[lane] + molecular)).sqrt();
+            look.across[lane] = (2.0 * mobility * (across * speed[lane] + molecular)).sqrt();
+        }
+        let mut speed_slope = [[0.0_f32; LANES]; D];
+        let mut rest = [0.0_f32; LANES];
+        for i in 0..D {
+            for lane in 0..LANES {
+                let mut sum = 0.0;
+                for k in 0..D {
+                    sum += look.direction[k][lane] * slopes[k][i][0][lane];
+                }
+                speed_slope[i][lane] = sum;
+                rest[lane] += slopes[i][i][0][lane] - look.direction[i][lane] * sum;
+            }
+        }
+        for i in 0..D {
+            for lane in 0..LANES {
+                let mut turning = look.direction[i][lane] * rest[lane];
+                for j in 0..D {
+                    turning += look.direction[j][lane] * slopes[i][j][0][lane];
+                }
+                let spreading = across * speed_slope[i][lane] + (along - across) * turning;
+                let (low, high) = (around.faces[i][0][lane], around.faces[i][1][lane]);
+                let flow = low + around.fraction[i][lane] * (high - low);
+                look.speed[i][lane] = flow * mobility;
+                look.drift[i][lane] = (flow + spreading) * mobility;
+            }
+        }
+    }
+
+    /// - Equation: `B ξ = b ξ + (a − b) n (n·ξ)`, `a = √(2D_L)`, `b = √(2D_T)`.
+    /// - Symbols: `n` the direction of flow; its covariance is `b² (I − nnᵀ) + a² nnᵀ = 2D`.
+    /// - Range: any direction.
+    /// - Source: methods, section 1.2.
+    /// - Shape: 64 particles.
+    #[inline(always)]
+    fn displace(&self, look: &Look<D>, leap: &Leap, normals: [&Lane; D], positions: &mut [Lane; D]) {
+        for lane in 0..LANES {
+            let mut projection = 0.0_f32;
+            let xi: [f32; D] = std::array::from_fn(|axis| normals[axis][lane] as f32);
+            for axis in 0..D {
+                projection += look.direction[axis][lane] * xi[axis];
+            }
+            let (time, root) = (leap.narrow_time[lane], leap.narrow_root[lane]);
+            let across = look.across[lane] * root;
+            let rest = (look.along[lane] - look.across[lane]) * projection * root;
+            for axis in 0..D {
+                let step =
+                    look.drift[axis][lane] * time + (across * xi[axis] + rest * look.direction[axis][lane]);
+                positions[axis][lane] += f64::from(step);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn spread_along(&self, look: &Look<D>, axis: usize, spread: &mut Lane) {
+        for lane in 0..LANES {
+            let n = look.direction[axis][lane];
+            let (a, b) = (look.along[lane], look.across[lane]);
+            spread[lane] = f64::from(b * b + n * n * (a * a - b * b));
+        }
+    }
+
+    #[inline(always)]
+    fn longest(&self, look: &Look<D>, criteria: &Criteria, time: &mut Lane) {
+        let inverse_width: [f32; D] = std::array::from_fn(|axis| self.ruler[axis].inverse_width as f32);
+        let (courant, dispersion) = ((1.0 / criteria.courant) as f32, (0.5 / criteria.dispersion) as f32);
+        for lane in 0..LANES {
+            let (mut flow, mut spread) = (0.0_f32, 0.0_f32);
+            let (a, b) = (look.along[lane], look.across[lane]);
+            for axis in 0..D {
+                let n = look.direction[axis][lane];
+                flow += look.speed[axis][lane].abs() * inverse_width[axis];
+                spread += (b * b + n * n * (a * a - b * b)) * inverse_width[axis] * inverse_width[axis];
+            }
+            let rate = (flow * courant).max(spread * dispersion);
+            time[lane] = f64::from(1.0 / rate.max(f32::MIN_POSITIVE));
+        }
+    }
+
+    fn velocity(&self, place: [f64; D], axis: usize) -> f64 {
+        let mut around = Around::new();
+        self.gather(&place.map(|x| [x; LANES]), &mut around);
+        let [low, high] = &around.faces[axis];
+        f64::from(low[0] + around.fraction[axis][0] * (high[0] - low[0]))
+    }
+}

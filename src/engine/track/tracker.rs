@@ -1,0 +1,191 @@
+//! Groups of particles on their way through steps.
+//!
+//! Owns the order of work within a displacement. May use media, walls and monitors. It deliberately stores
+//! nothing: a group comes in, and goes on or leaves.
+
+use super::lanes::{LANES, Lane, Lanes};
+use super::medium::{Carrier, Criteria, Leap, Medium};
+use super::monitors::{Crossing, Plane};
+use super::noise::{Draws, Normals};
+use super::walls::{Ends, Exit, Stride};
+use crate::maths::wide::Width;
+
+/// Displacements that one step may be cut into.
+pub const MOST_SUB_STEPS: u64 = 1 << 14;
+
+/// Everything that a walk meets.
+pub struct Tracker<const D: usize, M: Medium<D>> {
+    pub medium: M,
+    pub ends: [Ends<D>; D],
+    pub planes: Vec<Plane<D>>,
+    pub draws: Draws,
+    /// Steps of each particle's own, if any.
+    pub criteria: Option<Criteria>,
+    pub width: Width,
+}
+
+/// Steps that a group goes through.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Steps {
+    pub first: u64,
+    /// One more than the last.
+    pub end: u64,
+    /// s
+    pub dt: f64,
+}
+
+/// What happens on the way, at a time.
+pub trait Events {
+    /// A particle has left through a side at time `t`.
+    fn left(&mut self, id: u64, exit: Exit, t: f64);
+    /// A particle has crossed a plane at time `t`.
+    fn crossed(&mut self, id: u64, plane: usize, crossing: Crossing, t: f64);
+}
+
+/// What one thread needs for a group.
+pub struct Bench<const D: usize, M: Medium<D>> {
+    pub lanes: Lanes<D>,
+    normals: Box<Normals>,
+    look: M::Look,
+    leap: Leap,
+    exits: Vec<Exit>,
+    /// Displacements done, one per particle.
+    pub displacements: u64,
+}
+
+/// A particle needed more sub-steps than there are.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TooManySubSteps {
+    pub id: u64,
+    pub step: u64,
+}
+
+impl<const D: usize, M: Medium<D>> Tracker<D, M> {
+    pub fn bench(&self) -> Bench<D, M> {
+        Bench {
+            lanes: Lanes::new(),
+            normals: Normals::new(),
+            look: self.medium.blank(),
+            leap: Leap::new(1.0),
+            exits: Vec::new(),
+            displacements: 0,
+        }
+    }
+
+    /// Takes the group of the bench through its steps. `entered` is the part of the first step that is over
+    /// when a particle comes in.
+    #[inline(always)]
+    pub fn advance(
+        &self,
+        carrier: &Carrier,
+        steps: Steps,
+        entered: Option<&Lane>,
+        bench: &mut Bench<D, M>,
+        events: &mut impl Events,
+    ) -> Result<(), TooManySubSteps> {
+        bench.normals.clear();
+        let mut late = entered;
+        for step in steps.first..steps.end {
+            let t = step as f64 * steps.dt;
+            let mut left = [steps.dt; LANES];
+            if let Some(entered) = late.take() {
+                for lane in 0..LANES {
+                    left[lane] = steps.dt * (1.0 - entered[lane]);
+                }
+            }
+            match &self.criteria {
+                None => {
+                    bench.leap.assign(&left);
+                    self.medium.look(carrier, &bench.lanes.positions, &mut bench.look);
+                    let start: Lane = left.map(|left| t + (steps.dt - left));
+                    self.displace(carrier, step, &start, bench, events);
+                    bench.displacements += bench.lanes.n as u64;
+                }
+                Some(criteria) => {
+                    self.sub_steps(carrier, criteria, (step, t + steps.dt), left, bench, events)?
+                }
+            }
+            if bench.lanes.gone & bench.lanes.occupied() == bench.lanes.occupied() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// One step in sub-steps of each particle's own.
+    #[inline(always)]
+    fn sub_steps(
+        &self,
+        carrier: &Carrier,
+        criteria: &Criteria,
+        (step, end): (u64, f64),
+        mut left: Lane,
+        bench: &mut Bench<D, M>,
+        events: &mut impl Events,
+    ) -> Result<(), TooManySubSteps> {
+        let mut time = [0.0; LANES];
+        for sub_step in 0..MOST_SUB_STEPS {
+            self.medium.look(carrier, &bench.lanes.positions, &mut bench.look);
+            self.medium.longest(&bench.look, criteria, &mut time);
+            let start: Lane = left.map(|left| end - left);
+            let mut is_going = 0_u64;
+            for lane in 0..LANES {
+                // A sliver of a sub-step is taken with the one before it.
+                time[lane] = if time[lane] * 1.0001 >= left[lane] { left[lane] } else { time[lane] };
+                left[lane] -= time[lane];
+                is_going |= u64::from(left[lane] > 0.0) << lane;
+                bench.displacements += u64::from(lane < bench.lanes.n && time[lane] > 0.0);
+            }
+            bench.leap.assign(&time);
+            self.displace(carrier, step * MOST_SUB_STEPS + sub_step, &start, bench, events);
+            let going = is_going & bench.lanes.occupied() & !bench.lanes.gone;
+            if going == 0 {
+                return Ok(());
+            }
+            if sub_step + 1 == MOST_SUB_STEPS {
+                return Err(TooManySubSteps { id: bench.lanes.ids[going.trailing_zeros() as usize], step });
+            }
+        }
+        Ok(())
+    }
+
+    /// One displacement of all lanes from `start` on, over the times of the leap.
+    #[inline(always)]
+    fn displace(
+        &self,
+        carrier: &Carrier,
+        number: u64,
+        start: &Lane,
+        bench: &mut Bench<D, M>,
+        events: &mut impl Events,
+    ) {
+        let Bench { lanes, normals, look, leap, exits, .. } = bench;
+        let before = lanes.positions;
+        let row = self.draws.prepare(self.width, &lanes.ids, number, normals);
+        let rows: [&Lane; D] = std::array::from_fn(|axis| normals.row(row + axis));
+        self.medium.displace(look, leap, rows, &mut lanes.positions);
+        let was_gone = lanes.gone;
+        let stride = Stride {
+            medium: &self.medium,
+            look,
+            carrier,
+            leap,
+            before: &before,
+            draws: &self.draws,
+            step: number,
+        };
+        for (axis, ends) in self.ends.iter().enumerate() {
+            ends.apply(axis, &stride, lanes, exits);
+        }
+        for (idx, plane) in self.planes.iter().enumerate() {
+            plane.crossings(&before, lanes, was_gone, |crossing| {
+                let t = start[crossing.lane] + crossing.fraction * leap.time[crossing.lane];
+                events.crossed(lanes.ids[crossing.lane], idx, crossing, t);
+            });
+        }
+        for exit in exits.drain(..) {
+            let t = start[exit.lane] + exit.fraction * leap.time[exit.lane];
+            events.left(lanes.ids[exit.lane], exit, t);
+        }
+    }
+}

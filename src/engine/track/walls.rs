@@ -1,0 +1,287 @@
+//! What happens to walks at the sides of the domain.
+//!
+//! Owns the laws of walls, exact for drift and dispersion that are constant near them. May use lanes and
+//! draws. It deliberately books nothing: what leaves is told to the caller.
+
+#![allow(clippy::needless_range_loop)] // Loops over lanes are hot.
+
+use super::lanes::{LANES, Lane, Lanes};
+use super::medium::{Carrier, Leap, Medium};
+use super::noise::Draws;
+use crate::maths::scalar::{exp, ln};
+
+/// `−ln` of the chance that a wall was touched, beyond which nobody asks.
+const FAR: f64 = 37.0;
+
+/// What a wall does.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Law {
+    Reflect,
+    Absorb,
+    /// `J = k c`, m/s.
+    Partial(f64),
+    /// What comes with the water leaves with it, and there is no gradient.
+    Outflow,
+}
+
+/// A part of a wall: the first that holds a place decides.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Patch<const D: usize> {
+    pub low: [f64; D],
+    pub high: [f64; D],
+    pub law: Law,
+}
+
+/// One axis of the domain.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Ends<const D: usize> {
+    /// What leaves comes in at the other side.
+    Periodic { low: f64, high: f64 },
+    /// The lower wall and the upper one; `None` is open.
+    Walls([Option<Wall<D>>; 2]),
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Wall<const D: usize> {
+    pub at: f64,
+    pub patches: Vec<Patch<D>>,
+}
+
+/// A particle that has left.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Exit {
+    pub lane: usize,
+    /// Twice the axis, plus one at its upper end.
+    pub side: usize,
+    pub patch: usize,
+    /// Part of the displacement that was done.
+    pub fraction: f64,
+}
+
+/// One displacement of a group, before and after.
+pub struct Stride<'a, const D: usize, M: Medium<D>> {
+    pub medium: &'a M,
+    pub look: &'a M::Look,
+    pub carrier: &'a Carrier,
+    pub leap: &'a Leap,
+    pub before: &'a [Lane; D],
+    pub draws: &'a Draws,
+    /// Number of the displacement.
+    pub step: u64,
+}
+
+/// A way between two distances from a wall; below 0 is beyond it.
+#[derive(Debug, Clone, Copy)]
+struct Way {
+    from: f64,
+    to: f64,
+    /// `2 D_n Δt`
+    spread: f64,
+}
+
+impl Way {
+    /// Smallest distance on the way.
+    ///
+    /// - Equation: `m = ½ [d₀ + d₁ − √((d₁ − d₀)² − 2 s ln U)]`.
+    /// - Symbols: `d₀`, `d₁` distances before and after, `s = 2 D_n Δt`, `U` uniform.
+    /// - Range: `d₀ ≥ 0`; without dispersion the smaller end.
+    /// - Source: methods, equation 1.8; minimum of a Brownian bridge (Asmussen, Glynn, Pitman 1995,
+    ///   doi:10.1214/aoap/1177004597).
+    /// - Shape: one particle.
+    fn lowest(self, uniform: f64) -> f64 {
+        let step = self.to - self.from;
+        0.5 * (self.from + self.to - (step * step - 2.0 * self.spread * ln(uniform)).sqrt())
+    }
+
+    /// Chance that the wall was touched.
+    fn touches(self) -> f64 {
+        if self.to <= 0.0 || self.from <= 0.0 { 1.0 } else { exp(-2.0 * self.from * self.to / self.spread) }
+    }
+
+    /// Part of the way at which the wall is met.
+    fn meeting(self) -> f64 {
+        if self.to < 0.0 { self.from / (self.from - self.to) } else { 0.5 }
+    }
+}
+
+/// Where a particle is after it met a wall.
+enum Fate {
+    At(f64),
+    Gone,
+}
+
+impl Law {
+    /// The end of a way. `k` is the velocity with which what touches the wall leaves, m/s.
+    ///
+    /// - Equation: `d = d₁ + L`, `L = max(0, −m)`; survival `e^{−kL/D}`; absorbed if `m < 0`.
+    /// - Symbols: `m` smallest distance of the free way, `L` push of the wall, `D` dispersion normal to it.
+    /// - Range: any step; exact for constant drift and dispersion.
+    /// - Source: methods, section 1.6; A. V. Skorokhod (1961), doi:10.1137/1106035; `E dL = D c(0) dt`, so that
+    ///   killing at rate `k/D` per push is the flux `k c`.
+    /// - Shape: one particle.
+    fn end(self, way: Way, k: f64, dt: f64, uniforms: [f64; 2]) -> Fate {
+        if self == Self::Absorb {
+            let is_met = way.to < 0.0 || uniforms[0] < way.touches();
+            return if is_met { Fate::Gone } else { Fate::At(way.to) };
+        }
+        let push = (-way.lowest(uniforms[0])).max(0.0);
+        if push > 0.0 && k > 0.0 {
+            // L k / D, with D = s / (2 Δt).
+            let exponent = if way.spread > 0.0 { 2.0 * push * k * dt / way.spread } else { f64::INFINITY };
+            if uniforms[1] >= exp(-exponent) {
+                return Fate::Gone;
+            }
+        }
+        Fate::At((way.to + push).max(0.0))
+    }
+}
+
+impl<const D: usize> Ends<D> {
+    /// Applies what happens at both ends of an axis.
+    #[inline(always)]
+    pub fn apply<M: Medium<D>>(
+        &self,
+        axis: usize,
+        stride: &Stride<D, M>,
+        lanes: &mut Lanes<D>,
+        exits: &mut Vec<Exit>,
+    ) {
+        match self {
+            Self::Periodic { low, high } => wrap(&mut lanes.positions[axis], *low, *high),
+            Self::Walls(walls) => {
+                if walls.iter().all(Option::is_none) {
+                    return;
+                }
+                let mut spread = [0.0; LANES];
+                stride.medium.spread_along(stride.look, axis, &mut spread);
+                for lane in 0..LANES {
+                    spread[lane] *= stride.leap.time[lane];
+                }
+                for (end, wall) in walls.iter().enumerate() {
+                    let Some(wall) = wall else { continue };
+                    let near = wall.near(axis, end, stride.before, &lanes.positions, &spread);
+                    let near = near & lanes.occupied() & !lanes.gone;
+                    if near != 0 {
+                        wall.meet([axis, end], near, stride, lanes, &spread, exits);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// `x ← x − L ⌊(x − low)/L⌋`
+#[inline(always)]
+fn wrap(positions: &mut Lane, low: f64, high: f64) {
+    let length = high - low;
+    let mut n_outside = 0_u64;
+    for x in positions.iter_mut() {
+        let above = if *x < low { *x + length } else { *x };
+        let inside = if above >= high { above - length } else { above };
+        n_outside |= u64::from(!(inside >= low && inside <= high));
+        *x = inside;
+    }
+    if n_outside != 0 {
+        for x in positions.iter_mut().filter(|x| x.is_finite()) {
+            *x = (low + (*x - low).rem_euclid(length)).clamp(low, high);
+        }
+    }
+}
+
+impl<const D: usize> Wall<D> {
+    /// One bit per particle that may have touched the wall.
+    #[inline(always)]
+    fn near(&self, axis: usize, end: usize, before: &[Lane; D], after: &[Lane; D], spread: &Lane) -> u64 {
+        let sign = if end == 0 { 1.0 } else { -1.0 };
+        let mut is_near = [0_u8; LANES];
+        let mut any = 0_u8;
+        for lane in 0..LANES {
+            let from = sign * (before[axis][lane] - self.at);
+            let to = sign * (after[axis][lane] - self.at);
+            let near = u8::from(to < 0.0) | u8::from(2.0 * from * to < FAR * spread[lane]);
+            is_near[lane] = near;
+            any |= near;
+        }
+        if any == 0 {
+            return 0;
+        }
+        (0..LANES).fold(0, |mask, lane| mask | u64::from(is_near[lane]) << lane)
+    }
+
+    /// Works out what the wall does to the particles of a mask.
+    #[cold]
+    #[inline(never)]
+    fn meet<M: Medium<D>>(
+        &self,
+        [axis, end]: [usize; 2],
+        mut near: u64,
+        stride: &Stride<D, M>,
+        lanes: &mut Lanes<D>,
+        spread: &Lane,
+        exits: &mut Vec<Exit>,
+    ) {
+        let sign = if end == 0 { 1.0 } else { -1.0 };
+        let side = 2 * axis + end;
+        while near != 0 {
+            let lane = near.trailing_zeros() as usize;
+            near &= near - 1;
+            let from = (sign * (stride.before[axis][lane] - self.at)).max(0.0);
+            let to = sign * (lanes.positions[axis][lane] - self.at);
+            let way = Way { from, to, spread: spread[lane] };
+            let mut place: [f64; D] = std::array::from_fn(|other| lanes.positions[other][lane]);
+            place[axis] = self.at;
+            let Some(patch) = self.patches.iter().position(|patch| patch.holds(&place, axis)) else {
+                continue;
+            };
+            let law = self.patches[patch].law;
+            let k = match law {
+                Law::Reflect | Law::Absorb => 0.0,
+                Law::Partial(rate) => rate,
+                Law::Outflow => (-sign * stride.medium.velocity(place, axis)).max(0.0),
+            } * stride.carrier.mobility;
+            let uniforms = stride.draws.uniforms(lanes.ids[lane], stride.step, side as u64);
+            let dt = stride.leap.time[lane];
+            match law.end(way, k, dt, [uniforms[0], uniforms[1]]) {
+                Fate::At(distance) => lanes.positions[axis][lane] = self.at + sign * distance,
+                Fate::Gone => {
+                    lanes.positions[axis][lane] = self.at;
+                    lanes.gone |= 1 << lane;
+                    exits.push(Exit { lane, side, patch, fraction: way.meeting() });
+                }
+            }
+        }
+    }
+}
+
+impl<const D: usize> Patch<D> {
+    /// Whether a place of the wall belongs to this part of it.
+    fn holds(&self, place: &[f64; D], axis: usize) -> bool {
+        (0..D).all(|other| {
+            other == axis || (place[other] >= self.low[other] && place[other] <= self.high[other])
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_dispersion_walls_are_met_exactly() {
+        let way = Way { from: 1.0, to: -0.5, spread: 0.0 };
+        assert!(matches!(Law::Absorb.end(way, 0.0, 1.0, [0.5; 2]), Fate::Gone));
+        assert!(matches!(Law::Outflow.end(way, 1.0, 1.0, [0.5; 2]), Fate::Gone));
+        assert!(matches!(Law::Reflect.end(way, 0.0, 1.0, [0.5; 2]), Fate::At(d) if d == 0.0));
+        let away = Way { to: 2.0, ..way };
+        assert!(matches!(Law::Absorb.end(away, 0.0, 1.0, [0.5; 2]), Fate::At(d) if d == 2.0));
+        assert!((way.meeting() - 2.0 / 3.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn far_outside_a_period_comes_back() {
+        let mut lane = [0.5; LANES];
+        (lane[0], lane[1], lane[2]) = (7.25, -3.25, 1.0);
+        wrap(&mut lane, 0.0, 1.0);
+        assert_eq!([lane[0], lane[1], lane[2], lane[3]], [0.25, 0.75, 0.0, 0.5]);
+    }
+}
