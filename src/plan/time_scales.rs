@@ -4,8 +4,9 @@
 //! no particle: a few states, and a coarse implicit course from each to the end of the run.
 
 use super::chemistry::Kinetics;
-use super::tape::dual::differentiate;
+use super::tape::dual::{Slopes, differentiate};
 use super::{Axis, Plan};
+use std::collections::BTreeMap;
 
 /// Points along each axis at which initial values are taken.
 const POINTS: usize = 17;
@@ -102,7 +103,7 @@ impl Network<'_> {
     }
 
     /// Rates, and their derivatives by components.
-    fn rates(&self, position: [f64; 3], t: f64, components: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
+    fn rates(&self, position: [f64; 3], t: f64, components: &[f64]) -> (Vec<f64>, Vec<Slopes>) {
         let [x, y, z] = position;
         let mut inputs = vec![x, y, z, t];
         inputs.extend(self.species(components));
@@ -110,14 +111,13 @@ impl Network<'_> {
         let (values, slopes) = differentiate(&self.kinetics.laws.operations, &inputs, 4, n_species);
         let registers = self.kinetics.laws.rates.iter().map(|&register| usize::from(register));
         let by_component = |register: usize| {
-            let mut slope = vec![0.0; components.len()];
-            for (s, species) in self.plan.species.iter().enumerate() {
-                let own = slopes[register * n_species + s];
-                if own != 0.0 {
-                    species.terms.iter().for_each(|&(k, coefficient)| slope[k] += own * coefficient);
+            let mut slope: BTreeMap<usize, f64> = BTreeMap::new();
+            for &(s, own) in slopes[register].iter().filter(|(_, own)| *own != 0.0) {
+                for &(k, coefficient) in &self.plan.species[s].terms {
+                    *slope.entry(k).or_default() += own * coefficient;
                 }
             }
-            slope
+            slope.into_iter().collect()
         };
         (registers.clone().map(|register| values[register]).collect(), registers.map(by_component).collect())
     }
@@ -134,14 +134,17 @@ impl Network<'_> {
             let mut f = vec![0.0; n];
             let mut j = vec![0.0; n * n];
             for (k, reaction) in self.kinetics.reactions.iter().enumerate() {
-                let own: f64 = reaction.changes.iter().map(|&(i, nu)| nu * slopes[k][i]).sum();
+                let slope_by = |i: usize| {
+                    slopes[k].binary_search_by_key(&i, |(other, _)| *other).map_or(0.0, |at| slopes[k][at].1)
+                };
+                let own: f64 = reaction.changes.iter().map(|&(i, nu)| nu * slope_by(i)).sum();
                 if own.is_finite() {
                     largest[k] = largest[k].max(own.abs());
                     fastest = fastest.max(own.abs());
                 }
                 for &(i, nu) in &reaction.changes {
                     f[i] += nu * rates[k];
-                    (0..n).for_each(|column| j[i * n + column] += nu * slopes[k][column]);
+                    slopes[k].iter().for_each(|&(column, slope)| j[i * n + column] += nu * slope);
                 }
             }
             let h = step.unwrap_or(if fastest > 0.0 { FIRST_STEP / fastest } else { duration });
@@ -168,12 +171,16 @@ fn implicit(j: &[f64], f: &[f64], h: f64) -> Option<Vec<f64>> {
     for pivot in 0..n {
         let best = (pivot..n).max_by(|&a, &b| rows[a][pivot].abs().total_cmp(&rows[b][pivot].abs()))?;
         rows.swap(pivot, best);
-        let head = rows[pivot].clone();
-        for row in rows.iter_mut().skip(pivot + 1) {
-            let factor = row[pivot] / head[pivot];
-            if factor != 0.0 {
-                (pivot..=n).for_each(|column| row[column] -= factor * head[column]);
-            }
+        // Networks of many reactions are sparse: a component meets few others.
+        let head: Vec<(usize, f64)> =
+            (pivot..=n).map(|column| (column, rows[pivot][column])).filter(|(_, x)| *x != 0.0).collect();
+        let largest = rows[pivot][pivot];
+        if largest == 0.0 {
+            return None;
+        }
+        for row in rows.iter_mut().skip(pivot + 1).filter(|row| row[pivot] != 0.0) {
+            let factor = row[pivot] / largest;
+            head.iter().for_each(|&(column, x)| row[column] -= factor * x);
         }
     }
     let mut solution = vec![0.0; n];

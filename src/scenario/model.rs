@@ -198,21 +198,24 @@ fn initial_of<'a>(
 
 /// A species without a dimension of its own takes that of its reaction's other species.
 fn spread_dimensions(checker: &mut Checker<'_>, statements: &Statements<'_>) {
-    for _ in 0..=statements.reactions.len() {
-        for (span, reaction) in &statements.reactions {
-            let members: Vec<(usize, Span)> = reaction
-                .reactants
-                .iter()
-                .chain(&reaction.products)
-                .filter_map(|term| match checker.scope.get(&term.species.value)?.origin {
-                    Origin::Species(idx) => Some((idx, term.species.span)),
-                    _ => None,
-                })
-                .collect();
+    let members = |reaction: &tree::Reaction| -> Vec<(usize, Span)> {
+        let terms = reaction.reactants.iter().chain(&reaction.products);
+        let species = |term: &tree::Term| match checker.scope.get(&term.species.value)?.origin {
+            Origin::Species(idx) => Some((idx, term.species.span)),
+            _ => None,
+        };
+        terms.filter_map(species).collect()
+    };
+    let members: Vec<_> = statements.reactions.iter().map(|(_, reaction)| members(reaction)).collect();
+    let mut is_changed = true;
+    while is_changed {
+        is_changed = false;
+        for ((span, _), members) in statements.reactions.iter().zip(&members) {
             let known =
                 members.iter().find_map(|(idx, place)| Some((checker.species_dimensions[*idx]?, *place)));
             let Some((dimension, place)) = known else { continue };
-            for (idx, own_place) in members {
+            for &(idx, own_place) in members {
+                is_changed |= checker.species_dimensions[idx].is_none();
                 let own = *checker.species_dimensions[idx].get_or_insert(dimension);
                 if own != dimension {
                     checker.report(
