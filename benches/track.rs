@@ -68,7 +68,7 @@ fn time<const D: usize, M: Medium<D>>(name: &str, medium: M, high: [f64; D], dt:
     let mut best = f64::INFINITY;
     for tile_idx in 0..n_tiles {
         let start = cpu();
-        let steps = Steps { first: tile_idx * tile, end: (tile_idx + 1) * tile, dt };
+        let steps = Steps { first: tile_idx * tile, end: (tile_idx + 1) * tile, t: 0.0, dt };
         for first in (0..ids.len()).step_by(64) {
             let range = first..(first + 64).min(ids.len());
             bench.lanes.load(&ids[range.clone()], positions.each_ref().map(|axis| &axis[range.clone()]));

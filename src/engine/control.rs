@@ -1,10 +1,13 @@
 //! How a caller follows and stops a run.
 //!
-//! Owns the settings and the line to the caller. May use nothing else of the crate. It deliberately
+//! Owns the settings and the line to the caller. May use `flow`. It deliberately
 //! prints nothing.
 
+use crate::flow::FaceFlow;
+use std::sync::Arc;
+
 /// How a plan is run: threads and vector instructions change no byte of the results, half draws do.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Settings {
     /// Threads of a pool of its own; `None` takes the pool of the caller.
     pub threads: Option<usize>,
@@ -14,6 +17,8 @@ pub struct Settings {
     /// plan with half the step and without this: both runs then follow the same paths, and differ by
     /// what the step does to them alone.
     pub takes_half_draws: bool,
+    /// The flow of the plan, where one has to be solved or read.
+    pub flow: Option<Arc<FaceFlow>>,
 }
 
 /// Progress and Ctrl-C, asked once per step.

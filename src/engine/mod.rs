@@ -10,6 +10,7 @@ mod conserved;
 mod control;
 mod error;
 mod initial;
+mod mass;
 mod mix;
 mod observe;
 mod parallel;
@@ -56,6 +57,14 @@ fn run_here(
     control: &dyn Control,
     sink: &mut (dyn FnMut(Snapshot) -> Result<(), RunError> + Send),
 ) -> Result<Outcome, RunError> {
+    if plan.transport.is_some() {
+        return match plan.axes.len() {
+            1 => mass::run::<1>(plan, settings, control, sink),
+            2 => mass::run::<2>(plan, settings, control, sink),
+            3 => mass::run::<3>(plan, settings, control, sink),
+            n => Err(program::unsound(&format!("{n} axes"))),
+        };
+    }
     match plan.axes.len() {
         0 => run::run::<0>(plan, settings, control, sink),
         1 => run::run::<1>(plan, settings, control, sink),

@@ -30,7 +30,9 @@ pub struct Steps {
     pub first: u64,
     /// One more than the last.
     pub end: u64,
-    /// s
+    /// When the first one begins, s.
+    pub t: f64,
+    /// Length of each, s.
     pub dt: f64,
 }
 
@@ -86,7 +88,7 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
         bench.normals.clear();
         let mut late = entered;
         for step in steps.first..steps.end {
-            let t = step as f64 * steps.dt;
+            let t = steps.t + (step - steps.first) as f64 * steps.dt;
             let mut left = [steps.dt; LANES];
             if let Some(entered) = late.take() {
                 for lane in 0..LANES {

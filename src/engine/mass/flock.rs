@@ -1,0 +1,129 @@
+//! Particles of one species in blocks that shrink and grow.
+//!
+//! Owns the arrays. May use `state`' size of a block. It deliberately gives no meaning to the place of a
+//! particle: its identity is its number.
+
+use crate::state::particles::BLOCK;
+
+/// Bits of a particle's number that count within its origin.
+pub const COUNT_BITS: u32 = 40;
+
+/// Number of a particle: where it came from, and which one it is.
+pub fn id(origin: usize, count: u64) -> u64 {
+    (origin as u64) << COUNT_BITS | count
+}
+
+/// Where a particle came from.
+pub fn origin(id: u64) -> usize {
+    (id >> COUNT_BITS) as usize
+}
+
+/// Which one of its origin it is.
+pub fn count(id: u64) -> u64 {
+    id & ((1 << COUNT_BITS) - 1)
+}
+
+/// Up to [`BLOCK`] particles of one population.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Flock<const D: usize> {
+    pub population: usize,
+    pub ids: Vec<u64>,
+    /// m
+    pub positions: [Vec<f64>; D],
+}
+
+impl<const D: usize> Flock<D> {
+    pub fn new(population: usize) -> Self {
+        Self { population, ids: Vec::new(), positions: [const { Vec::new() }; D] }
+    }
+
+    pub fn len(&self) -> usize {
+        self.ids.len()
+    }
+
+    pub fn push(&mut self, id: u64, position: [f64; D]) {
+        self.ids.push(id);
+        for (axis, x) in self.positions.iter_mut().zip(position) {
+            axis.push(x);
+        }
+    }
+
+    pub fn position(&self, idx: usize) -> [f64; D] {
+        std::array::from_fn(|axis| self.positions[axis][idx])
+    }
+
+    pub fn truncate(&mut self, len: usize) {
+        self.ids.truncate(len);
+        self.positions.iter_mut().for_each(|axis| axis.truncate(len));
+    }
+
+    /// Copies particle `from` to place `to`.
+    pub fn copy(&mut self, from: usize, to: usize) {
+        self.ids[to] = self.ids[from];
+        for axis in &mut self.positions {
+            axis[to] = axis[from];
+        }
+    }
+}
+
+/// Adds a particle to the last flock of its population, or to a new one.
+pub fn add<const D: usize>(flocks: &mut Vec<Flock<D>>, population: usize, id: u64, position: [f64; D]) {
+    let last = flocks.iter_mut().rev().find(|flock| flock.population == population);
+    match last {
+        Some(flock) if flock.len() < BLOCK => flock.push(id, position),
+        _ => {
+            let mut flock = Flock::new(population);
+            flock.push(id, position);
+            flocks.push(flock);
+        }
+    }
+}
+
+/// Fills flocks up again when they are half empty on the whole.
+pub fn gather<const D: usize>(flocks: &mut Vec<Flock<D>>) {
+    flocks.retain(|flock| flock.len() > 0);
+    let n_particles: usize = flocks.iter().map(Flock::len).sum();
+    if flocks.len() < 16 || n_particles * 2 > flocks.len() * BLOCK {
+        return;
+    }
+    let mut filled: Vec<Flock<D>> = Vec::new();
+    flocks.sort_by_key(|flock| flock.population);
+    for mut flock in flocks.drain(..) {
+        let room = filled.last_mut().filter(|last| {
+            last.population == flock.population && last.len() + flock.len() <= BLOCK
+        });
+        match room {
+            Some(last) => {
+                last.ids.append(&mut flock.ids);
+                last.positions.iter_mut().zip(&mut flock.positions).for_each(|(to, from)| to.append(from));
+            }
+            None => filled.push(flock),
+        }
+    }
+    *flocks = filled;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nothing_is_lost_when_flocks_are_gathered() {
+        let mut flocks: Vec<Flock<1>> = Vec::new();
+        for idx in 0..40 {
+            let mut flock = Flock::new(idx % 3);
+            (0..100 * idx).for_each(|k| flock.push(id(idx, k as u64), [k as f64]));
+            flocks.push(flock);
+        }
+        let mut before: Vec<(usize, u64)> =
+            flocks.iter().flat_map(|flock| flock.ids.iter().map(|&id| (flock.population, id))).collect();
+        gather(&mut flocks);
+        let mut after: Vec<(usize, u64)> =
+            flocks.iter().flat_map(|flock| flock.ids.iter().map(|&id| (flock.population, id))).collect();
+        before.sort_unstable();
+        after.sort_unstable();
+        assert_eq!(before, after);
+        assert!(flocks.len() < 16 && flocks.iter().all(|flock| flock.len() <= BLOCK));
+        assert_eq!((origin(id(7, 9)), count(id(7, 9))), (7, 9));
+    }
+}

@@ -1,0 +1,157 @@
+//! What outputs see of particles that carry mass.
+//!
+//! Owns the sums over flocks. May use exact sums, grids and the plan. It deliberately disturbs nothing, and
+//! its sums do not hang on the order of particles.
+
+use super::super::error::RunError;
+use super::super::parallel;
+use super::super::program::unsound;
+use super::super::snapshot::{Snapshot, Values};
+use super::flock::{self, Flock};
+use super::world::Site;
+use crate::maths::exact::{Quanta, Sum};
+use crate::plan::{Output, OutputKind, Quantity};
+use crate::state::grid::Grid;
+use crate::state::particles::CHUNK;
+
+/// What is looked at.
+pub struct Scene<'a, const D: usize> {
+    pub site: &'a Site<'a, D>,
+    pub flocks: &'a [Flock<D>],
+    pub units: &'a [f64],
+    pub quanta: Quanta,
+}
+
+impl<const D: usize> Scene<'_, D> {
+    pub fn observe(&self, output_idx: usize, t: f64) -> Result<Snapshot, RunError> {
+        let output = &self.site.plan.outputs[output_idx];
+        let values = match output.kind {
+            OutputKind::Profile | OutputKind::Map => self.binned(output)?,
+            OutputKind::Total => Values::Total { amount: self.totals(output) },
+            OutputKind::Particles => self.particles(output),
+            OutputKind::Covariance | OutputKind::Mixing => {
+                return Err(unsound("an output of fluid in a run of masses"));
+            }
+        };
+        Ok(Snapshot { output_idx, t, values })
+    }
+
+    /// The populations of an output's species, in its order; nothing is carried by some.
+    fn populations(&self, output: &Output) -> Vec<Option<usize>> {
+        let of = |quantity: &Quantity| {
+            let (Quantity::Species(species) | Quantity::Pair(species, _)) = *quantity;
+            self.site.transport.populations.iter().position(|population| population.species == species)
+        };
+        output.quantities.iter().map(of).collect()
+    }
+
+    fn binned(&self, output: &Output) -> Result<Values, RunError> {
+        let bins: [usize; D] =
+            output.bins.clone().try_into().map_err(|_| unsound("an output whose bins do not fit"))?;
+        let grid = Grid::new(self.site.low, self.site.high, bins, [true; D])
+            .ok_or_else(|| unsound("an output whose bins do not make a grid"))?;
+        let centres: Vec<[f64; D]> = (0..grid.n_bins()).map(|bin| grid.centre(bin)).collect();
+        let porosity = self.site.evaluate(&self.site.transport.porosity, &centres, 0.0);
+        let volume: f64 =
+            (0..D).map(|axis| (self.site.high[axis] - self.site.low[axis]) / bins[axis] as f64).product();
+        let mut mean = Vec::new();
+        let mut standard_error = Vec::new();
+        let mut n_particles = vec![0_u64; grid.n_bins()];
+        for population in self.populations(output) {
+            let sums = population.map_or_else(|| vec![Cell::default(); grid.n_slots()], |p| self.sums(p, &grid));
+            let retardation = population.map_or(1.0, |p| self.site.transport.populations[p].retardation);
+            let per = |bin: usize| 1.0 / (porosity[bin] * retardation * volume);
+            mean.push((0..grid.n_bins()).map(|bin| sums[bin].mass.value() * per(bin)).collect());
+            standard_error
+                .push((0..grid.n_bins()).map(|bin| sums[bin].square.value().sqrt() * per(bin)).collect());
+            n_particles.iter_mut().zip(&sums).for_each(|(n, cell)| *n += cell.n);
+        }
+        Ok(Values::Binned { mean, standard_error, n_particles })
+    }
+
+    /// Mass, squared mass and number of a population per slot of a grid.
+    fn sums(&self, population: usize, grid: &Grid<D>) -> Vec<Cell> {
+        let flocks: Vec<&Flock<D>> =
+            self.flocks.iter().filter(|flock| flock.population == population).collect();
+        let n_groups = flocks.len().clamp(1, 16);
+        let per_group = flocks.len().div_ceil(n_groups).max(1);
+        let groups: Vec<&[&Flock<D>]> = flocks.chunks(per_group).collect();
+        let largest = self.units.iter().fold(0.0, |a: f64, &b| a.max(b));
+        let square = Quanta::new(largest * largest, 1 << 40);
+        let partial = parallel::map(groups.len(), &|group| {
+            let mut cells = vec![Cell::default(); grid.n_slots()];
+            let mut slots = [0_i32; CHUNK];
+            for flock in groups[group] {
+                for first in (0..flock.len()).step_by(CHUNK) {
+                    let range = first..(first + CHUNK).min(flock.len());
+                    let positions = flock.positions.each_ref().map(|axis| &axis[range.clone()]);
+                    grid.locate(positions, &mut slots[..range.len()]);
+                    for (slot, &id) in slots.iter().zip(&flock.ids[range]) {
+                        let mass = self.units[flock::origin(id)];
+                        let cell = &mut cells[*slot as usize];
+                        self.quanta.add(&mut cell.mass, mass);
+                        square.add(&mut cell.square, mass * mass);
+                        cell.n += 1;
+                    }
+                }
+            }
+            cells
+        });
+        let mut whole = vec![Cell::default(); grid.n_slots()];
+        for cells in partial {
+            for (sum, part) in whole.iter_mut().zip(cells) {
+                sum.mass.merge(part.mass);
+                sum.square.merge(part.square);
+                sum.n += part.n;
+            }
+        }
+        whole
+    }
+
+    fn totals(&self, output: &Output) -> Vec<f64> {
+        self.populations(output).into_iter().map(|p| p.map_or(0.0, |p| self.inside(p))).collect()
+    }
+
+    /// Mass of a population that is there.
+    pub fn inside(&self, population: usize) -> f64 {
+        let mut sum = Sum::default();
+        for flock in self.flocks.iter().filter(|flock| flock.population == population) {
+            for &id in &flock.ids {
+                self.quanta.add(&mut sum, self.units[flock::origin(id)]);
+            }
+        }
+        sum.value()
+    }
+
+    /// Positions in the order of numbers; the mass stands in the column of the particle's species.
+    fn particles(&self, output: &Output) -> Values {
+        let populations = self.populations(output);
+        let mut list: Vec<(u64, usize, usize)> = Vec::new();
+        for (flock_idx, flock) in self.flocks.iter().enumerate() {
+            if populations.contains(&Some(flock.population)) {
+                list.extend(flock.ids.iter().enumerate().map(|(idx, &id)| (id, flock_idx, idx)));
+            }
+        }
+        list.sort_unstable();
+        let positions = (0..D)
+            .map(|axis| list.iter().map(|&(_, flock, idx)| self.flocks[flock].positions[axis][idx]).collect())
+            .collect();
+        let column = |population: &Option<usize>| {
+            list.iter()
+                .map(|&(id, flock, _)| {
+                    let is_own = Some(self.flocks[flock].population) == *population;
+                    if is_own { self.units[flock::origin(id)] } else { 0.0 }
+                })
+                .collect()
+        };
+        Values::Particles { positions, concentrations: populations.iter().map(column).collect() }
+    }
+}
+
+/// Sums of a bin.
+#[derive(Debug, Clone, Copy, Default)]
+struct Cell {
+    mass: Sum,
+    square: Sum,
+    n: u64,
+}

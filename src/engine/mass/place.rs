@@ -1,0 +1,178 @@
+//! Where particles that carry mass begin.
+//!
+//! Owns the map from a share of a mass to a place. May use `maths`. It deliberately draws nothing: shares and
+//! uniform numbers are given.
+
+use crate::maths::scalar::{cos, ln, sin};
+
+/// Mass spread over places.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Place<const D: usize> {
+    Point([f64; D]),
+    Line([f64; D], [f64; D]),
+    Box([f64; D], [f64; D]),
+    /// Centre and standard deviations.
+    Gaussian([f64; D], [f64; D]),
+    Cells(Cells<D>),
+    Faces(Faces<D>),
+    /// One place per particle.
+    List(Vec<[f64; D]>),
+}
+
+/// Equal cells with a mass each.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cells<const D: usize> {
+    low: [f64; D],
+    width: [f64; D],
+    n: [usize; D],
+    cumulative: Vec<f64>,
+}
+
+/// Rectangles of one side with a weight each.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Faces<const D: usize> {
+    corners: Vec<([f64; D], [f64; D])>,
+    cumulative: Vec<f64>,
+}
+
+/// Cells that an initial concentration is looked at in, in all.
+const MOST_CELLS: f64 = 1_048_576.0;
+
+impl<const D: usize> Cells<D> {
+    /// Cells over a domain. `mass` gives the masses per volume at a list of centres.
+    pub fn new(low: [f64; D], high: [f64; D], mass: impl Fn(&[[f64; D]]) -> Vec<f64>) -> Self {
+        let n = shape(low, high);
+        let width: [f64; D] = std::array::from_fn(|axis| (high[axis] - low[axis]) / n[axis] as f64);
+        let volume: f64 = width.iter().product();
+        let n_cells: usize = n.iter().product();
+        let mut cells = Self { low, width, n, cumulative: Vec::with_capacity(n_cells) };
+        let mut sum = 0.0;
+        for first in (0..n_cells).step_by(4096) {
+            let centres: Vec<[f64; D]> =
+                (first..(first + 4096).min(n_cells)).map(|cell| cells.inside(cell, [0.5; D])).collect();
+            for mass in mass(&centres) {
+                sum += mass * volume;
+                cells.cumulative.push(sum);
+            }
+        }
+        cells
+    }
+
+    pub fn total(&self) -> f64 {
+        self.cumulative.last().copied().unwrap_or(0.0)
+    }
+
+    fn inside(&self, cell: usize, fraction: [f64; D]) -> [f64; D] {
+        let mut rest = cell;
+        let mut place = [0.0; D];
+        for axis in (0..D).rev() {
+            place[axis] = self.low[axis] + ((rest % self.n[axis]) as f64 + fraction[axis]) * self.width[axis];
+            rest /= self.n[axis];
+        }
+        place
+    }
+}
+
+/// Cells of nearly equal sides.
+fn shape<const D: usize>(low: [f64; D], high: [f64; D]) -> [usize; D] {
+    let length: [f64; D] = std::array::from_fn(|axis| high[axis] - low[axis]);
+    let longest = length.iter().fold(0.0, |a: f64, &b| a.max(b));
+    let shares: f64 = length.iter().map(|l| l / longest).product();
+    let most = crate::maths::scalar::pow(MOST_CELLS / shares.max(1e-9), 1.0 / D as f64);
+    length.map(|l| ((most * l / longest) as usize).clamp(1, 1 << 20))
+}
+
+/// The first index whose cumulative sum is above a value, and the part of it that is below.
+fn find(cumulative: &[f64], wanted: f64) -> (usize, f64) {
+    let idx = cumulative.partition_point(|&sum| sum <= wanted).min(cumulative.len().saturating_sub(1));
+    let before = if idx == 0 { 0.0 } else { cumulative[idx - 1] };
+    let own = cumulative[idx] - before;
+    (idx, if own > 0.0 { ((wanted - before) / own).clamp(0.0, 1.0) } else { 0.5 })
+}
+
+impl<const D: usize> Faces<D> {
+    pub fn new(faces: Vec<([f64; D], [f64; D], f64)>) -> Self {
+        let mut sum = 0.0;
+        let mut next = |weight: f64| {
+            sum += weight;
+            sum
+        };
+        let cumulative = faces.iter().map(|face| next(face.2)).collect();
+        Self { corners: faces.into_iter().map(|(low, high, _)| (low, high)).collect(), cumulative }
+    }
+
+    pub fn total(&self) -> f64 {
+        self.cumulative.last().copied().unwrap_or(0.0)
+    }
+}
+
+impl<const D: usize> Place<D> {
+    /// The place of a particle: `share` from 0 to 1 of the mass comes before it, `uniforms` are its own.
+    pub fn at(&self, share: f64, uniforms: &[f64; 8], count: u64) -> [f64; D] {
+        let between = |low: &[f64; D], high: &[f64; D]| {
+            std::array::from_fn(|axis| low[axis] + uniforms[axis] * (high[axis] - low[axis]))
+        };
+        match self {
+            Self::Point(place) => *place,
+            Self::Line(from, to) => std::array::from_fn(|axis| from[axis] + share * (to[axis] - from[axis])),
+            Self::Box(low, high) => between(low, high),
+            Self::Gaussian(centre, deviation) => {
+                let normals = normals(uniforms);
+                std::array::from_fn(|axis| centre[axis] + deviation[axis] * normals[axis])
+            }
+            Self::Cells(cells) => {
+                let (cell, part) = find(&cells.cumulative, share * cells.total());
+                // Along one axis the share itself is the best draw; it is one of several otherwise.
+                let fraction = std::array::from_fn(|axis| if D == 1 { part } else { uniforms[axis] });
+                cells.inside(cell, fraction)
+            }
+            Self::Faces(faces) => {
+                let (face, _) = find(&faces.cumulative, uniforms[3] * faces.total());
+                let (low, high) = &faces.corners[face];
+                between(low, high)
+            }
+            Self::List(places) => places[count as usize % places.len()],
+        }
+    }
+}
+
+/// Box–Muller of four uniform numbers.
+fn normals(uniforms: &[f64; 8]) -> [f64; 4] {
+    let pair = |u: f64, v: f64| {
+        let radius = (-2.0 * ln(u)).sqrt();
+        let angle = std::f64::consts::TAU * v;
+        [radius * cos(angle), radius * sin(angle)]
+    };
+    let ([a, b], [c, d]) = (pair(uniforms[0], uniforms[1]), pair(uniforms[2], uniforms[4]));
+    [a, b, c, d]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shares_follow_the_mass() {
+        // Mass on the right half only: every share lies there, the median in its middle.
+        let cells = Cells::new([0.0], [2.0], |xs| xs.iter().map(|x| f64::from(x[0] > 1.0)).collect());
+        assert!((cells.total() - 1.0).abs() < 1e-5);
+        let place = Place::Cells(cells);
+        for (share, x) in [(0.001, 1.001), (0.5, 1.5), (0.999, 1.999)] {
+            assert!((place.at(share, &[0.5; 8], 0)[0] - x).abs() < 1e-5);
+        }
+        let faces = Faces::new(vec![([0.0, 0.0], [0.0, 1.0], 1.0), ([0.0, 1.0], [0.0, 2.0], 3.0)]);
+        let uniforms = |face: f64| [0.5, 0.5, 0.5, face, 0.5, 0.5, 0.5, 0.5];
+        let place = Place::Faces(faces);
+        assert_eq!(place.at(0.0, &uniforms(0.2), 0), [0.0, 0.5]);
+        assert_eq!(place.at(0.0, &uniforms(0.3), 0), [0.0, 1.5]);
+    }
+
+    #[test]
+    fn cells_are_many_but_not_too_many() {
+        assert_eq!(shape([0.0], [3.0]), [1 << 20]);
+        let n = shape([0.0, 0.0], [200.0, 80.0]);
+        assert!(n[0] * n[1] <= 1 << 20 && n[0] * n[1] > 1 << 19, "{n:?}");
+        let n = shape([0.0, 0.0, 0.0], [1e3, 1.0, 1e-3]);
+        assert!(n.iter().product::<usize>() <= 1 << 21 && n.iter().all(|&n| n >= 1), "{n:?}");
+    }
+}

@@ -1,0 +1,328 @@
+//! The plan's transport as loops want it.
+//!
+//! Owns the making of walls, releases and units of mass. May use the plan, `flow` and `track`. It deliberately
+//! runs nothing.
+
+use super::super::error::RunError;
+use super::super::program::unsound;
+use super::super::track::medium::{Carrier, Medium};
+use super::super::track::noise::Draws;
+use super::super::track::tracker::Tracker;
+use super::super::track::walls::{self, Ends, Law, Wall};
+use super::entry::Entry;
+use super::place::{Cells, Faces, Place};
+use super::release::{Kind, Release, Sampling};
+use crate::flow::FaceFlow;
+use crate::maths::wide::Width;
+use crate::plan::tape::Tape;
+use crate::plan::transport::{Region, SideRule, Source, Strength, Transport};
+use crate::plan::{Normals, Placement, Plan};
+use std::sync::Arc;
+
+/// What the builders read.
+pub struct Site<'a, const D: usize> {
+    pub plan: &'a Plan,
+    pub transport: &'a Transport,
+    pub flow: Option<Arc<FaceFlow>>,
+    pub low: [f64; D],
+    pub high: [f64; D],
+}
+
+impl<'a, const D: usize> Site<'a, D> {
+    pub fn new(plan: &'a Plan, flow: Option<Arc<FaceFlow>>) -> Result<Self, RunError> {
+        let transport = plan.transport.as_ref().ok_or_else(|| unsound("no transport"))?;
+        let axis = |value: fn(&crate::plan::Axis) -> f64| std::array::from_fn(|idx| value(&plan.axes[idx]));
+        Ok(Self { plan, transport, flow, low: axis(|a| a.low), high: axis(|a| a.high) })
+    }
+
+    /// A tape at places, at a time.
+    pub fn evaluate(&self, tape: &Tape, places: &[[f64; D]], t: f64) -> Vec<f64> {
+        let mut inputs = [const { Vec::new() }; 4];
+        for (idx, input) in inputs.iter_mut().enumerate() {
+            let axis = self.plan.axes.iter().position(|axis| axis.index == idx);
+            *input = match axis {
+                Some(axis) => places.iter().map(|place| place[axis]).collect(),
+                None => vec![if idx == 3 { t } else { 0.0 }; places.len()],
+            };
+        }
+        let inputs: Vec<&[f64]> = inputs.iter().map(|input: &Vec<f64>| &input[..]).collect();
+        let mut values = vec![0.0; places.len()];
+        tape.evaluate_block(&inputs, &mut Vec::new(), &mut values);
+        values
+    }
+
+    pub fn carriers(&self) -> Vec<Carrier> {
+        let carrier = |population: &crate::plan::transport::Population| Carrier {
+            mobility: if population.is_mobile { 1.0 / population.retardation } else { 0.0 },
+            molecular: population.molecular,
+        };
+        self.transport.populations.iter().map(carrier).collect()
+    }
+
+    pub fn tracker<M: Medium<D>>(&self, medium: M, width: Width) -> Result<Tracker<D, M>, RunError> {
+        let is_double = self.plan.walk.normals == Normals::Double;
+        let mut ends: Vec<Ends<D>> = Vec::with_capacity(D);
+        for axis in 0..D {
+            ends.push(self.ends(axis)?);
+        }
+        Ok(Tracker {
+            medium,
+            ends: ends.try_into().map_err(|_| unsound("sides that do not fit the axes"))?,
+            planes: Vec::new(),
+            draws: Draws::new(self.plan.seed, D, is_double),
+            criteria: self.transport.sub_steps.map(|sub| super::super::track::medium::Criteria {
+                courant: sub.courant,
+                dispersion: sub.dispersion,
+            }),
+            width,
+        })
+    }
+
+    fn ends(&self, axis: usize) -> Result<Ends<D>, RunError> {
+        let sides = self.transport.sides.get(axis).ok_or_else(|| unsound("an axis without sides"))?;
+        let is_periodic = |end: usize| sides[end].iter().any(|patch| patch.rule == SideRule::Periodic);
+        if is_periodic(0) || is_periodic(1) {
+            return Ok(Ends::Periodic { low: self.low[axis], high: self.high[axis] });
+        }
+        let wall = |end: usize| {
+            if sides[end].iter().all(|patch| patch.rule == SideRule::Open) {
+                return None;
+            }
+            let at = if end == 0 { self.low[axis] } else { self.high[axis] };
+            let patch = |patch: &crate::plan::transport::Patch| walls::Patch {
+                low: std::array::from_fn(|other| patch.low[other]),
+                high: std::array::from_fn(|other| patch.high[other]),
+                law: law(&patch.rule),
+            };
+            Some(Wall { at, patches: sides[end].iter().map(patch).collect() })
+        };
+        Ok(Ends::Walls([wall(0), wall(1)]))
+    }
+
+    /// Everything that gives mass, with the units that a population's particles follow from.
+    pub fn releases<M: Medium<D>>(&self, tracker: &Tracker<D, M>) -> Result<Vec<Release<D>>, RunError> {
+        let mut releases = Vec::new();
+        for (idx, population) in self.transport.populations.iter().enumerate() {
+            let mut parts = self.parts(tracker, idx)?;
+            let whole: f64 = parts.iter().map(|part| part.mass).sum();
+            if !whole.is_finite() || whole < 0.0 {
+                return Err(unsound(&format!("the mass of population {idx} is {whole}")));
+            }
+            let unit = whole / population.count.max(1) as f64;
+            parts.retain(|part| part.mass > 0.0);
+            for part in parts {
+                let origin = releases.len();
+                releases.push(part.release(origin, idx, unit, self.plan.time.n_steps));
+            }
+        }
+        Ok(releases)
+    }
+
+    fn parts<M: Medium<D>>(&self, tracker: &Tracker<D, M>, population: usize) -> Result<Vec<Part<D>>, RunError> {
+        let mut parts = vec![self.initial(population)?];
+        let species = self.transport.populations[population].species;
+        for source in self.transport.sources.iter().filter(|source| source.species == species) {
+            parts.push(self.source(source, population));
+        }
+        for axis in 0..D {
+            for end in 0..2 {
+                for patch in &self.transport.sides[axis][end] {
+                    parts.extend(self.side(tracker, population, [axis, end], patch));
+                }
+            }
+        }
+        Ok(parts)
+    }
+
+    fn initial(&self, population: usize) -> Result<Part<D>, RunError> {
+        let of = &self.transport.populations[population];
+        let cells = Cells::new(self.low, self.high, |centres| {
+            let porosity = self.evaluate(&self.transport.porosity, centres, 0.0);
+            let values = self.evaluate(&of.initial, centres, 0.0);
+            porosity.iter().zip(values).map(|(porosity, c)| porosity * of.retardation * c).collect()
+        });
+        let sampling = match self.plan.particles.placement {
+            Placement::Random => Sampling::Random,
+            Placement::Stratified => Sampling::Stratified,
+            Placement::Ordered => Sampling::Ordered,
+        };
+        Ok(Part {
+            name: "initial".into(),
+            mass: cells.total(),
+            place: Place::Cells(cells),
+            shape: Shape::Steady { from: 0.0, to: 0.0, sampling },
+        })
+    }
+
+    fn source(&self, source: &Source, population: usize) -> Part<D> {
+        let array = |list: &[f64]| std::array::from_fn(|axis| list.get(axis).copied().unwrap_or(0.0));
+        let place = match &source.region {
+            Region::Point(at) => Place::Point(array(at)),
+            Region::Line(from, to) => Place::Line(array(from), array(to)),
+            Region::Box(low, high) => Place::Box(array(low), array(high)),
+            Region::Gaussian(centre, deviation) => Place::Gaussian(array(centre), array(deviation)),
+            Region::Table(columns) => {
+                let n = columns.first().map_or(0, Vec::len);
+                Place::List((0..n).map(|row| std::array::from_fn(|axis| columns[axis][row])).collect())
+            }
+        };
+        let (from, to) = (source.during.0, source.during.1.min(self.plan.time.duration));
+        let sampling = Sampling::Stratified;
+        let (mass, shape) = match source.strength {
+            Strength::Pulse(mass) => (mass, Shape::Steady { from, to: from, sampling }),
+            Strength::Rate(rate) => (rate * (to - from).max(0.0), Shape::Steady { from, to, sampling }),
+            Strength::Held(c) => {
+                let Region::Box(low, high) = &source.region else {
+                    return Part { name: source.name.clone(), mass: 0.0, place, shape: Shape::Steady { from, to, sampling } };
+                };
+                let (low, high) = (array(low), array(high));
+                let volume: f64 = (0..D).map(|axis| high[axis] - low[axis]).product();
+                let centre = std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis]));
+                let porosity = self.evaluate(&self.transport.porosity, &[centre], 0.0)[0];
+                let retardation = self.transport.populations[population].retardation;
+                (c * porosity * retardation * volume, Shape::Filled { low, high, from, to })
+            }
+        };
+        Part { name: source.name.clone(), mass, place, shape }
+    }
+
+    /// What enters through a patch of a side.
+    fn side<M: Medium<D>>(
+        &self,
+        tracker: &Tracker<D, M>,
+        population: usize,
+        [axis, end]: [usize; 2],
+        patch: &crate::plan::transport::Patch,
+    ) -> Vec<Part<D>> {
+        let of = &self.transport.populations[population];
+        let (tapes, is_held) = match &patch.rule {
+            SideRule::Inflow(tapes) => (tapes, false),
+            SideRule::Held(tapes) => (tapes, true),
+            _ => return Vec::new(),
+        };
+        let Some(tape) = tapes.get(of.species) else { return Vec::new() };
+        let sign = if end == 0 { 1.0 } else { -1.0 };
+        let duration = self.plan.time.duration;
+        let name = format!("side {}", 2 * axis + end);
+        let mut flux = Vec::new();
+        let mut parts = Vec::new();
+        for (low, high) in self.faces(axis, end, patch) {
+            let centre: [f64; D] = std::array::from_fn(|other| 0.5 * (low[other] + high[other]));
+            let area: f64 =
+                (0..D).filter(|&other| other != axis).map(|other| high[other] - low[other]).product();
+            let c = self.evaluate(tape, &[centre], 0.0)[0];
+            let porosity = self.evaluate(&self.transport.porosity, &[centre], 0.0)[0];
+            let inwards = sign * tracker.medium.velocity(centre, axis);
+            if !is_held {
+                flux.push((low, high, c * porosity * area * inwards.max(0.0)));
+                continue;
+            }
+            let carrier = self.carriers()[population];
+            let entry = |time: f64| Entry {
+                velocity: inwards * carrier.mobility,
+                dispersion: 0.5 * spread(&tracker.medium, &carrier, centre, axis),
+                time,
+            };
+            let density = c * porosity * of.retardation * area;
+            let step = entry(self.plan.time.step);
+            parts.push(Part {
+                name: name.clone(),
+                mass: density * entry(duration).total(),
+                place: Place::Box(low, high),
+                shape: Shape::Held { per_step: density * step.total(), entry: step, axis, sign },
+            });
+        }
+        if !is_held {
+            let faces = Faces::new(flux);
+            parts.push(Part {
+                name,
+                mass: faces.total() * duration,
+                place: Place::Faces(faces),
+                shape: Shape::Steady { from: 0.0, to: duration, sampling: Sampling::Stratified },
+            });
+        }
+        parts
+    }
+
+    /// Rectangles of a patch in which the flow is smooth: the faces of cells, or the patch itself.
+    fn faces(
+        &self,
+        axis: usize,
+        end: usize,
+        patch: &crate::plan::transport::Patch,
+    ) -> Vec<([f64; D], [f64; D])> {
+        let at = if end == 0 { self.low[axis] } else { self.high[axis] };
+        let mut faces: Vec<([f64; D], [f64; D])> = vec![([at; D], [at; D])];
+        for other in (0..D).filter(|&other| other != axis) {
+            let limits = (patch.low[other].max(self.low[other]), patch.high[other].min(self.high[other]));
+            let index = self.plan.axes[other].index;
+            let whole = [self.low[other], self.high[other]];
+            let edges: &[f64] = self.flow.as_ref().map_or(&whole, |flow| &flow.cells.edges()[index]);
+            let mut cut = Vec::new();
+            for pair in edges.windows(2) {
+                let (low, high) = (pair[0].max(limits.0), pair[1].min(limits.1));
+                if low < high {
+                    for (mut from, mut to) in faces.iter().copied() {
+                        (from[other], to[other]) = (low, high);
+                        cut.push((from, to));
+                    }
+                }
+            }
+            faces = cut;
+        }
+        faces
+    }
+}
+
+/// `2 D_nn` of a carrier at a place.
+fn spread<const D: usize, M: Medium<D>>(medium: &M, carrier: &Carrier, place: [f64; D], axis: usize) -> f64 {
+    let lanes = place.map(|x| [x; super::super::track::lanes::LANES]);
+    let mut look = medium.blank();
+    medium.look(carrier, &lanes, &mut look);
+    let mut spread = lanes[0];
+    medium.spread_along(&look, axis, &mut spread);
+    spread[0]
+}
+
+fn law(rule: &SideRule) -> Law {
+    match rule {
+        SideRule::Reflect | SideRule::Periodic | SideRule::Open | SideRule::Inflow(_) => Law::Reflect,
+        SideRule::Absorb | SideRule::Held(_) => Law::Absorb,
+        SideRule::Partial(rate) => Law::Partial(*rate),
+        SideRule::Outflow => Law::Outflow,
+    }
+}
+
+/// Mass from one place, before it is cut into particles.
+struct Part<const D: usize> {
+    name: String,
+    mass: f64,
+    place: Place<D>,
+    shape: Shape<D>,
+}
+
+enum Shape<const D: usize> {
+    Steady { from: f64, to: f64, sampling: Sampling },
+    /// Mass per step.
+    Held { per_step: f64, entry: Entry, axis: usize, sign: f64 },
+    Filled { low: [f64; D], high: [f64; D], from: f64, to: f64 },
+}
+
+impl<const D: usize> Part<D> {
+    /// Cuts the mass into particles of about `unit`; these add up to the mass exactly.
+    fn release(self, origin: usize, population: usize, unit: f64, _n_steps: u64) -> Release<D> {
+        let n = (self.mass / unit).round().max(1.0);
+        let equal = self.mass / n;
+        let (unit, kind) = match self.shape {
+            Shape::Steady { from, to, sampling } => {
+                let n = if let Place::List(list) = &self.place { list.len() as f64 } else { n };
+                (self.mass / n, Kind::Steady { n: n as u64, from, to, sampling })
+            }
+            Shape::Held { per_step, entry, axis, sign } => {
+                (unit, Kind::Held { per_step: per_step / unit, entry, axis, sign, from: 0.0, to: f64::INFINITY })
+            }
+            Shape::Filled { low, high, from, to } => (equal, Kind::Filled { n: n as u64, low, high, from, to }),
+        };
+        Release { name: self.name, origin, population, unit, place: self.place, kind }
+    }
+}
