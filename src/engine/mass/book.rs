@@ -11,11 +11,21 @@ use crate::maths::exact::{Quanta, Sum};
 /// What can happen to a particle.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum What {
-    Entered { origin: usize },
-    Left { side: usize, patch: usize },
-    Crossed { plane: usize, is_forward: bool },
+    Entered {
+        origin: usize,
+    },
+    Left {
+        side: usize,
+        patch: usize,
+    },
+    Crossed {
+        plane: usize,
+        is_forward: bool,
+    },
     /// Taken out by what fills its place again.
-    Replaced { origin: usize },
+    Replaced {
+        origin: usize,
+    },
 }
 
 /// Something that happened, with the mass it happened to.

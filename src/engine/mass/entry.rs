@@ -103,7 +103,8 @@ mod tests {
             let entry = Entry { velocity, dispersion: 0.3, time: 0.4 };
             let deepest = entry.travelled().max(0.0) + 8.0 * entry.length();
             for x in [0.0, 0.1, 0.5, 2.0] {
-                let expected = integrate(|y| profile(entry, y), &[x, deepest.max(x + 1.0)], 1e-13, 1e-12).value;
+                let expected =
+                    integrate(|y| profile(entry, y), &[x, deepest.max(x + 1.0)], 1e-13, 1e-12).value;
                 let found = entry.beyond(x);
                 // Near v = 0 the flow is left out: half of a step's Péclet number at most.
                 let error = (found - expected).abs();

@@ -56,14 +56,6 @@ impl<const D: usize> Flock<D> {
         self.ids.truncate(len);
         self.positions.iter_mut().for_each(|axis| axis.truncate(len));
     }
-
-    /// Copies particle `from` to place `to`.
-    pub fn copy(&mut self, from: usize, to: usize) {
-        self.ids[to] = self.ids[from];
-        for axis in &mut self.positions {
-            axis[to] = axis[from];
-        }
-    }
 }
 
 /// Adds a particle to the last flock of its population, or to a new one.
@@ -89,9 +81,9 @@ pub fn gather<const D: usize>(flocks: &mut Vec<Flock<D>>) {
     let mut filled: Vec<Flock<D>> = Vec::new();
     flocks.sort_by_key(|flock| flock.population);
     for mut flock in flocks.drain(..) {
-        let room = filled.last_mut().filter(|last| {
-            last.population == flock.population && last.len() + flock.len() <= BLOCK
-        });
+        let room = filled
+            .last_mut()
+            .filter(|last| last.population == flock.population && last.len() + flock.len() <= BLOCK);
         match room {
             Some(last) => {
                 last.ids.append(&mut flock.ids);

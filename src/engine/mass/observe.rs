@@ -58,7 +58,8 @@ impl<const D: usize> Scene<'_, D> {
         let mut standard_error = Vec::new();
         let mut n_particles = vec![0_u64; grid.n_bins()];
         for population in self.populations(output) {
-            let sums = population.map_or_else(|| vec![Cell::default(); grid.n_slots()], |p| self.sums(p, &grid));
+            let sums =
+                population.map_or_else(|| vec![Cell::default(); grid.n_slots()], |p| self.sums(p, &grid));
             let retardation = population.map_or(1.0, |p| self.site.transport.populations[p].retardation);
             let per = |bin: usize| 1.0 / (porosity[bin] * retardation * volume);
             mean.push((0..grid.n_bins()).map(|bin| sums[bin].mass.value() * per(bin)).collect());

@@ -46,14 +46,14 @@ pub fn run<const D: usize>(
                 velocity.clone().try_into().map_err(|_| unsound("a velocity that does not fit the axes"))?;
             go(&site, uniform(plan, velocity, dispersion)?, settings, control, sink)
         }
-        (Flow::Darcy(_) | Flow::File(_), Dispersion::Velocity { longitudinal, transverse, molecular, .. }) => {
+        (
+            Flow::Darcy(_) | Flow::File(_),
+            Dispersion::Velocity { longitudinal, transverse, molecular, .. },
+        ) => {
             let flow = site.flow.as_ref().ok_or_else(|| unsound("a flow that nobody solved"))?;
             let axes = std::array::from_fn(|axis| plan.axes[axis].index);
-            let dispersivity = Dispersivity {
-                longitudinal: *longitudinal,
-                transverse: *transverse,
-                molecular: *molecular,
-            };
+            let dispersivity =
+                Dispersivity { longitudinal: *longitudinal, transverse: *transverse, molecular: *molecular };
             let medium = CellMedium::<D>::new(flow, axes, dispersivity)
                 .ok_or_else(|| unsound("cells that are not equal, or porosity that varies"))?;
             go(&site, medium, settings, control, sink)
@@ -309,7 +309,9 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
                 let (tracker, units) = (&self.tracker, &self.units);
                 self.benches.lend(
                     || Box::new(tracker.bench()),
-                    |bench| go_on(tracker, &carrier, units, steps, Some(&entered), &mut flock, bench, &mut found),
+                    |bench| {
+                        go_on(tracker, &carrier, units, steps, Some(&entered), &mut flock, bench, &mut found)
+                    },
                 );
             }
             self.take(found)?;

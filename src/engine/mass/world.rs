@@ -118,7 +118,11 @@ impl<'a, const D: usize> Site<'a, D> {
         Ok(releases)
     }
 
-    fn parts<M: Medium<D>>(&self, tracker: &Tracker<D, M>, population: usize) -> Result<Vec<Part<D>>, RunError> {
+    fn parts<M: Medium<D>>(
+        &self,
+        tracker: &Tracker<D, M>,
+        population: usize,
+    ) -> Result<Vec<Part<D>>, RunError> {
         let mut parts = vec![self.initial(population)?];
         let species = self.transport.populations[population].species;
         for source in self.transport.sources.iter().filter(|source| source.species == species) {
@@ -173,7 +177,12 @@ impl<'a, const D: usize> Site<'a, D> {
             Strength::Rate(rate) => (rate * (to - from).max(0.0), Shape::Steady { from, to, sampling }),
             Strength::Held(c) => {
                 let Region::Box(low, high) = &source.region else {
-                    return Part { name: source.name.clone(), mass: 0.0, place, shape: Shape::Steady { from, to, sampling } };
+                    return Part {
+                        name: source.name.clone(),
+                        mass: 0.0,
+                        place,
+                        shape: Shape::Steady { from, to, sampling },
+                    };
                 };
                 let (low, high) = (array(low), array(high));
                 let volume: f64 = (0..D).map(|axis| high[axis] - low[axis]).product();
@@ -302,10 +311,24 @@ struct Part<const D: usize> {
 }
 
 enum Shape<const D: usize> {
-    Steady { from: f64, to: f64, sampling: Sampling },
+    Steady {
+        from: f64,
+        to: f64,
+        sampling: Sampling,
+    },
     /// Mass per step.
-    Held { per_step: f64, entry: Entry, axis: usize, sign: f64 },
-    Filled { low: [f64; D], high: [f64; D], from: f64, to: f64 },
+    Held {
+        per_step: f64,
+        entry: Entry,
+        axis: usize,
+        sign: f64,
+    },
+    Filled {
+        low: [f64; D],
+        high: [f64; D],
+        from: f64,
+        to: f64,
+    },
 }
 
 impl<const D: usize> Part<D> {
@@ -318,10 +341,13 @@ impl<const D: usize> Part<D> {
                 let n = if let Place::List(list) = &self.place { list.len() as f64 } else { n };
                 (self.mass / n, Kind::Steady { n: n as u64, from, to, sampling })
             }
-            Shape::Held { per_step, entry, axis, sign } => {
-                (unit, Kind::Held { per_step: per_step / unit, entry, axis, sign, from: 0.0, to: f64::INFINITY })
+            Shape::Held { per_step, entry, axis, sign } => (
+                unit,
+                Kind::Held { per_step: per_step / unit, entry, axis, sign, from: 0.0, to: f64::INFINITY },
+            ),
+            Shape::Filled { low, high, from, to } => {
+                (equal, Kind::Filled { n: n as u64, low, high, from, to })
             }
-            Shape::Filled { low, high, from, to } => (equal, Kind::Filled { n: n as u64, low, high, from, to }),
         };
         Release { name: self.name, origin, population, unit, place: self.place, kind }
     }
