@@ -51,6 +51,10 @@ fn walls<const D: usize>(high: [f64; D]) -> [Ends<D>; D] {
 
 /// Takes a million particles through steps, eight at a time, and tells the time.
 fn time<const D: usize, M: Medium<D>>(name: &str, medium: M, high: [f64; D], dt: f64) {
+    let wanted = std::env::args().nth(1).filter(|wanted| !wanted.starts_with("--"));
+    if wanted.is_some_and(|wanted| !name.contains(&wanted)) {
+        return;
+    }
     let n = 1_000_000;
     let mut state = 1_u64;
     let mut next = || {

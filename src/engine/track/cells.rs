@@ -127,43 +127,68 @@ impl<const D: usize> CellMedium<D> {
     /// Velocities around each place: two faces per axis, and all corners.
     #[inline(always)]
     fn gather(&self, positions: &[Lane; D], around: &mut Around<D>) {
+        let Around { place, fraction, index, faces, corners } = around;
         for axis in 0..D {
-            let ruler = &self.ruler[axis];
-            let last = (ruler.n - 1) as f64;
+            let Ruler { low, inverse_width, n } = self.ruler[axis];
+            let last = (n - 1) as f64;
+            let (x, place, fraction) = (&positions[axis], &mut place[axis], &mut fraction[axis]);
             for lane in 0..LANES {
-                let along = (positions[axis][lane] - ruler.low) * ruler.inverse_width;
+                let along = (x[lane] - low) * inverse_width;
                 let floor = floor(along, last);
-                around.fraction[axis][lane] = (along - floor).clamp(0.0, 1.0) as f32;
-                around.place[axis][lane] = floor as i32;
+                let rest = (along - floor) as f32;
+                let rest = if rest > 0.0 { rest } else { 0.0 };
+                fraction[lane] = if rest < 1.0 { rest } else { 1.0 };
+                place[lane] = low_bits(floor);
             }
         }
-        for lane in 0..LANES {
-            let place: [usize; D] = std::array::from_fn(|axis| around.place[axis][lane] as usize);
-            for axis in 0..D {
-                let mut face = 0;
-                for other in 0..D {
-                    face += place[other] * self.face_strides[axis][other];
-                }
-                around.faces[axis][0][lane] = self.faces[axis][face];
-                around.faces[axis][1][lane] = self.faces[axis][face + self.face_strides[axis][axis]];
+        for axis in 0..D {
+            number(place, &self.face_strides[axis], index);
+            let (source, step) = (&self.faces[axis][..], self.face_strides[axis][axis]);
+            let [low, high] = &mut faces[axis];
+            for lane in 0..LANES {
+                let face = index[lane] as usize;
+                low[lane] = source[face];
+                high[lane] = source[face + step];
             }
-            let mut corner = 0;
-            for axis in 0..D {
-                corner += place[axis] * self.corner_strides[axis];
+        }
+        number(place, &self.corner_strides, index);
+        let source = &self.corners[..];
+        for row in 0..1_usize << (D - 1) {
+            let mut offset = 0;
+            for axis in 0..D - 1 {
+                offset += (row >> (D - 2 - axis) & 1) * self.corner_strides[axis];
             }
-            for row in 0..1_usize << (D - 1) {
-                let mut first = corner;
-                for axis in 0..D - 1 {
-                    first += (row >> (D - 2 - axis) & 1) * self.corner_strides[axis];
-                }
-                let pair = &self.corners[first..first + 2];
+            for lane in 0..LANES {
+                let first = index[lane] as usize + offset;
+                let (low, high) = (&source[first], &source[first + 1]);
                 for axis in 0..D {
-                    around.corners[2 * row][axis][lane] = pair[0][axis];
-                    around.corners[2 * row + 1][axis][lane] = pair[1][axis];
+                    corners[2 * row][axis][lane] = low[axis];
+                    corners[2 * row + 1][axis][lane] = high[axis];
                 }
             }
         }
     }
+}
+
+/// Numbers of places in an array of these strides.
+#[inline(always)]
+fn number<const D: usize>(place: &[[i32; LANES]; D], strides: &[usize; D], index: &mut [i32; LANES]) {
+    index.fill(0);
+    for axis in 0..D {
+        let stride = strides[axis] as i32;
+        for lane in 0..LANES {
+            index[lane] += place[axis][lane] * stride;
+        }
+    }
+}
+
+/// Added to a number of moderate size it leaves the nearest whole number in the low bits.
+const SHIFT: f64 = 4_503_599_627_370_496.0;
+
+/// A whole number below 2³¹ as an integer; conversions do not vectorise everywhere.
+#[inline(always)]
+fn low_bits(whole: f64) -> i32 {
+    (whole + SHIFT).to_bits() as i32
 }
 
 /// Largest whole number not above `x`, within `0 … last`.
@@ -171,7 +196,6 @@ impl<const D: usize> CellMedium<D> {
 fn floor(x: f64, last: f64) -> f64 {
     let x = if x > 0.0 { x } else { 0.0 };
     let x = if x < last + 0.5 { x } else { last };
-    const SHIFT: f64 = 4_503_599_627_370_496.0;
     let nearest = (x + SHIFT) - SHIFT;
     let floor = if nearest > x { nearest - 1.0 } else { nearest };
     if floor < last { floor } else { last }
@@ -200,6 +224,7 @@ impl Ruler {
 struct Around<const D: usize> {
     place: [[i32; LANES]; D],
     fraction: [Narrow; D],
+    index: [i32; LANES],
     /// Per axis the lower and the upper face.
     faces: [[Narrow; 2]; D],
     /// Per corner (last axis fastest) and component.
@@ -212,6 +237,7 @@ impl<const D: usize> Around<D> {
         Self {
             place: [[0; LANES]; D],
             fraction: [[0.0; LANES]; D],
+            index: [0; LANES],
             faces: [[[0.0; LANES]; 2]; D],
             corners: [[[0.0; LANES]; D]; CORNERS],
         }
@@ -284,7 +310,10 @@ impl<const D: usize> Medium<D> for CellMedium<D> {
         let along = self.dispersivity.longitudinal as f32;
         let across = self.dispersivity.transverse as f32;
         let molecular = carrier.molecular.unwrap_or(self.dispersivity.molecular) as f32;
-        let inverse_width: [f32; D] = std::array::from_fn(|axis| self.ruler[axis].inverse_width as f32);
+        let mut inverse_width = [0.0_f32; D];
+        for axis in 0..D {
+            inverse_width[axis] = self.ruler[axis].inverse_width as f32;
+        }
         for component in 0..D {
             around.between(component, &inverse_width, &mut slopes[component]);
         }
@@ -337,19 +366,27 @@ impl<const D: usize> Medium<D> for CellMedium<D> {
     /// - Shape: 64 particles.
     #[inline(always)]
     fn displace(&self, look: &Look<D>, leap: &Leap, normals: [&Lane; D], positions: &mut [Lane; D]) {
-        for lane in 0..LANES {
-            let mut projection = 0.0_f32;
-            let xi: [f32; D] = std::array::from_fn(|axis| normals[axis][lane] as f32);
-            for axis in 0..D {
-                projection += look.direction[axis][lane] * xi[axis];
+        let mut xi = [[0.0_f32; LANES]; D];
+        let mut projection = [0.0_f32; LANES];
+        for axis in 0..D {
+            for lane in 0..LANES {
+                xi[axis][lane] = normals[axis][lane] as f32;
             }
-            let (time, root) = (leap.narrow_time[lane], leap.narrow_root[lane]);
-            let across = look.across[lane] * root;
-            let rest = (look.along[lane] - look.across[lane]) * projection * root;
-            for axis in 0..D {
-                let step =
-                    look.drift[axis][lane] * time + (across * xi[axis] + rest * look.direction[axis][lane]);
-                positions[axis][lane] += f64::from(step);
+            for lane in 0..LANES {
+                projection[lane] += look.direction[axis][lane] * xi[axis][lane];
+            }
+        }
+        for axis in 0..D {
+            for lane in 0..LANES {
+                let (a, b) = (look.along[lane], look.across[lane]);
+                let kick = b * xi[axis][lane] + (a - b) * projection[lane] * look.direction[axis][lane];
+                xi[axis][lane] =
+                    look.drift[axis][lane] * leap.narrow_time[lane] + kick * leap.narrow_root[lane];
+            }
+        }
+        for axis in 0..D {
+            for lane in 0..LANES {
+                positions[axis][lane] += f64::from(xi[axis][lane]);
             }
         }
     }
