@@ -32,6 +32,7 @@ check: cargo ## Look at format, lints and documentation
 bench: cargo ## Measure the hot loops (takes minutes; close other programs first)
 	$(CARGO) bench --bench step
 	$(CARGO) bench --bench speciation
+	$(CARGO) bench --bench flow
 
 bless: cargo ## Accept the present output of all snapshot tests; look at the difference before you commit
 	INSTA_UPDATE=always LAMELLA_BLESS=1 $(CARGO) test --release

@@ -4,6 +4,8 @@
 //! plan. It deliberately moves nothing: the engine does.
 
 pub mod cells;
+pub mod darcy;
+pub mod random_field;
 
 pub use cells::Cells;
 

@@ -5,6 +5,7 @@
 
 pub mod chacha;
 pub mod exact;
+pub mod fourier;
 pub mod normal;
 pub mod operator;
 pub mod order;

@@ -21,6 +21,8 @@ pub enum Purpose {
     Wall,
     /// New particles.
     Release,
+    /// Random conductivity.
+    Conductivity,
 }
 
 /// The generator of one purpose under one root seed.
@@ -39,6 +41,7 @@ impl Stream {
             Purpose::Track => "track",
             Purpose::Wall => "wall",
             Purpose::Release => "release",
+            Purpose::Conductivity => "conductivity",
         };
         let mut hasher = blake3::Hasher::new();
         hasher.update(b"lamella random stream 1\0");
