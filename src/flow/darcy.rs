@@ -103,8 +103,8 @@ pub fn solve(problem: Problem) -> Result<Solution, DarcyError> {
     let drive = dot(&rest, &rest).sqrt();
     let (mut iterations, mut correction) = (0, vec![0.0; n]);
     let (mut share, mut best) = (SHARE, f64::INFINITY);
-    let mut pass = 0;
-    while drive > 0.0 {
+    let n_passes = if drive > 0.0 { MOST_PASSES } else { 0 };
+    for pass in 0..n_passes {
         rest.iter_mut().for_each(|rest| *rest = -*rest);
         iterations += gradient::solve(&mut cycle, &mut rest, &mut correction, share, MOST_ITERATIONS);
         head.iter_mut().zip(&correction).for_each(|(head, correction)| *head += correction);
@@ -115,8 +115,7 @@ pub fn solve(problem: Problem) -> Result<Solution, DarcyError> {
         }
         rest = flow.imbalance();
         let worst = worst(&rest).1 / flow.through_flow();
-        pass += 1;
-        if worst <= ENOUGH || pass == MOST_PASSES || (pass > 1 && worst > 0.5 * best) {
+        if worst <= ENOUGH || worst > 0.5 * best {
             break;
         }
         best = best.min(worst);
@@ -149,8 +148,7 @@ fn finish(
     let through_flow = flow.through_flow();
     let (worst_cell, most) = worst(&rest);
     let worst_imbalance = if most == 0.0 { 0.0 } else { most / through_flow };
-    // Not `>`: what is no number has not converged.
-    if !(worst_imbalance <= MOST_IMBALANCE) {
+    if worst_imbalance.is_nan() || worst_imbalance > MOST_IMBALANCE {
         let place = flow.cells.place(worst_cell);
         return Err(DarcyError::NotConverged { iterations, imbalance: worst_imbalance, place });
     }
