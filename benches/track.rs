@@ -66,7 +66,15 @@ fn time<const D: usize, M: Medium<D>>(name: &str, medium: M, high: [f64; D], dt:
         std::array::from_fn(|axis| ids.iter().map(|_| next() * high[axis]).collect());
     let width = Width::widest();
     let draws = Draws::new(42, D, false);
-    let tracker = Tracker { medium, ends: walls(high), planes: Vec::new(), draws, criteria: None, width };
+    let tracker = Tracker {
+        medium,
+        ends: walls(high),
+        planes: Vec::new(),
+        interfaces: Vec::new(),
+        draws,
+        criteria: None,
+        width,
+    };
     let mut bench = tracker.bench();
     let (tile, n_tiles) = (16 / D as u64, 4);
     let mut best = f64::INFINITY;

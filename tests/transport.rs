@@ -5,8 +5,9 @@ mod support;
 use lamella::engine::Settings;
 use lamella::engine::snapshot::Values;
 use lamella::maths::scalar::{erf, erfc, exp};
+use lamella::plan::tape::{Binary, Operation, Tape, Unary};
 use lamella::plan::transport::{
-    Dispersion, Flow, Patch, Population, Region, SideRule, Source, Strength, Transport,
+    Dispersion, Flow, Interface, Patch, Population, Region, SideRule, Source, Strength, Transport,
 };
 use lamella::plan::{Axis, Output, OutputKind, Plan, Quantity, Side};
 use support::{constant, output, plain, run, run_with, walk};
@@ -235,4 +236,121 @@ fn threads_and_width_change_no_byte() {
     let reference = with(1, false);
     assert_eq!(reference, with(2, false));
     assert_eq!(reference, with(7, true));
+}
+
+/// `if x < at then low else high` of the first axis.
+fn jump(at: f64, low: f64, high: f64) -> Tape {
+    Tape {
+        operations: vec![
+            Operation::Input(0),
+            Operation::Constant(at),
+            Operation::Binary(Binary::Less, 0, 1),
+            Operation::Constant(low),
+            Operation::Constant(high),
+            Operation::Select(2, 3, 4),
+        ],
+    }
+}
+
+/// Methods, 10.0 item 3: a pulse beside a jump of dispersion, at small and large steps.
+#[test]
+fn discontinuous_dispersion_lets_the_right_mass_through() {
+    for low in [2.5, 0.5, 0.05] {
+        for step in [0.05, 0.5] {
+            let sides = [[SideRule::Reflect, SideRule::Reflect]];
+            let mut plan = scene(&[-25.0], &[25.0], &sides, 50_000, 6.0, step);
+            transport(&mut plan).dispersion = Dispersion::Isotropic(jump(-1.0, 5.0, low));
+            transport(&mut plan).interfaces.push(Interface { axis: 0, at: -1.0 });
+            transport(&mut plan).sources.push(pulse(&[-6.5]));
+            plan.outputs = vec![of(OutputKind::Profile, vec![100], vec![6.0])];
+            let (outcome, snapshots) = run(&plan);
+            assert!(outcome.worst_defect() < 1e-12);
+            let Values::Binned { mean, standard_error, .. } = &snapshots[0].values else { panic!() };
+            let (high, root) = (5.0_f64, |x: f64| x.sqrt());
+            let gauss =
+                |x: f64, d: f64| exp(-x * x / (4.0 * d * 6.0)) / root(4.0 * std::f64::consts::PI * d * 6.0);
+            let exact = |x: f64| {
+                if x < -1.0 {
+                    let share = (root(high) - root(low)) / (root(high) + root(low));
+                    gauss(x + 6.5, high) + share * gauss(x - 4.5, high)
+                } else {
+                    let factor = 2.0 * root(high) / (root(high) + root(low));
+                    let way = x + 1.0 + 5.5 * root(low / high);
+                    factor * exp(-way * way / (4.0 * low * 6.0))
+                        / root(4.0 * std::f64::consts::PI * high * 6.0)
+                }
+            };
+            // Walls at ±25 m are felt by 1e-3 of the mass: bins from −20 m on.
+            for bin in 10..90 {
+                let left = -25.0 + 0.5 * f64::from(bin);
+                let exact: f64 = (0..50).map(|k| exact(left + 0.01 * (f64::from(k) + 0.5)) / 50.0).sum();
+                let (found, error) = (mean[0][bin as usize], standard_error[0][bin as usize]);
+                let bound = 4.5 * error.max(1e-4) + 1e-4;
+                assert!((found - exact).abs() < bound, "D {low} step {step} bin {bin}: {found} {exact}");
+            }
+        }
+    }
+}
+
+/// Methods, 10.0 item 2: with the drift of the divergence what is uniform stays uniform.
+#[test]
+fn uniform_stays_uniform_where_dispersion_varies() {
+    let wave = Tape {
+        operations: vec![
+            Operation::Input(0),
+            Operation::Constant(std::f64::consts::TAU),
+            Operation::Binary(Binary::Multiply, 0, 1),
+            Operation::Unary(Unary::Sin, 2),
+            Operation::Constant(0.8),
+            Operation::Binary(Binary::Multiply, 3, 4),
+            Operation::Constant(1.0),
+            Operation::Binary(Binary::Add, 5, 6),
+        ],
+    };
+    let sides = [[SideRule::Periodic, SideRule::Periodic]];
+    let mut plan = scene(&[0.0], &[1.0], &sides, 200_000, 0.04, 1e-4);
+    transport(&mut plan).dispersion = Dispersion::Isotropic(wave);
+    transport(&mut plan).populations[0].initial = constant(1.0);
+    plan.particles.placement = lamella::plan::Placement::Random;
+    plan.outputs = vec![of(OutputKind::Profile, vec![50], vec![0.04])];
+    let (_, snapshots) = run(&plan);
+    let Values::Binned { mean, standard_error, .. } = &snapshots[0].values else { panic!() };
+    let chi: f64 = mean[0].iter().zip(&standard_error[0]).map(|(m, e)| ((m - 1.0) / e).powi(2)).sum();
+    // χ² of 49 degrees of freedom: 4 standard deviations above its mean.
+    assert!(chi / 49.0 < 1.0 + 4.0 * (2.0 / 49.0_f64).sqrt(), "{}", chi / 49.0);
+}
+
+/// Methods, 10.0 item 4: shear `u = α y`, covariance `[[2Dt + ⅔Dα²t³, Dαt²], [Dαt², 2Dt]]`.
+#[test]
+fn shear_spreads_as_it_should() {
+    let (alpha, d, t) = (0.72, 0.4, 4.2_f64);
+    let shear = Tape {
+        operations: vec![
+            Operation::Input(1),
+            Operation::Constant(alpha),
+            Operation::Binary(Binary::Multiply, 0, 1),
+        ],
+    };
+    let n = 200_000;
+    let mut errors = Vec::new();
+    for step in [0.42, 0.042] {
+        let sides = [[SideRule::Open, SideRule::Open], [SideRule::Open, SideRule::Open]];
+        let mut plan = scene(&[-40.0, -40.0], &[40.0, 40.0], &sides, n, t, step);
+        transport(&mut plan).flow = Flow::Expression(vec![shear.clone(), constant(0.0)]);
+        transport(&mut plan).dispersion = Dispersion::Constant(vec![d, 0.0, d]);
+        transport(&mut plan).sources.push(pulse(&[0.0, 0.0]));
+        plan.outputs = vec![of(OutputKind::Particles, vec![], vec![t])];
+        let (_, snapshots) = run(&plan);
+        let Values::Particles { positions, .. } = &snapshots[0].values else { panic!() };
+        let mean = |f: &dyn Fn(usize) -> f64| (0..n as usize).map(f).sum::<f64>() / n as f64;
+        let xx = mean(&|k| positions[0][k] * positions[0][k]);
+        let xy = mean(&|k| positions[0][k] * positions[1][k]);
+        let yy = mean(&|k| positions[1][k] * positions[1][k]);
+        let exact = 2.0 * d * t + 2.0 / 3.0 * d * alpha * alpha * t.powi(3);
+        assert!((yy / (2.0 * d * t) - 1.0).abs() < 4.0 * (2.0 / n as f64).sqrt());
+        errors.push(((xx / exact - 1.0).abs(), (xy / (d * alpha * t * t) - 1.0).abs()));
+    }
+    // Euler's error of the mixed moment is Δt/t; at the small step it is 1 %.
+    assert!(errors[0].1 < 0.12 && errors[1].1 < 0.02, "{errors:?}");
+    assert!(errors[1].0 < 0.02, "{errors:?}");
 }

@@ -11,6 +11,7 @@ use super::super::program::unsound;
 use super::super::schedule::{Due, schedule, step_length};
 use super::super::snapshot::{Outcome, Snapshot};
 use super::super::track::cells::{CellMedium, Dispersivity};
+use super::super::track::formula::{Formula, Spreading};
 use super::super::track::lanes::{LANES, Lane};
 use super::super::track::medium::{Carrier, Medium};
 use super::super::track::tracker::{Bench, Steps, TooManySubSteps, Tracker};
@@ -24,6 +25,7 @@ use crate::chemistry::Work;
 use crate::maths::exact::Quanta;
 use crate::maths::wide::Width;
 use crate::plan::Plan;
+use crate::plan::tape::{Operation, Tape};
 use crate::plan::transport::{Dispersion, Flow};
 use crate::state::stream::{Purpose, Stream};
 
@@ -41,11 +43,14 @@ pub fn run<const D: usize>(
 ) -> Result<Outcome, RunError> {
     let site = Site::<D>::new(plan, settings.flow.clone())?;
     match (&site.transport.flow, &site.transport.dispersion) {
-        (Flow::Uniform(velocity), dispersion) => {
+        (Flow::Uniform(velocity), Dispersion::Constant(_) | Dispersion::Velocity { .. })
+            if is_constant(&site.transport.porosity) =>
+        {
             let velocity: [f64; D] =
                 velocity.clone().try_into().map_err(|_| unsound("a velocity that does not fit the axes"))?;
-            go(&site, uniform(plan, velocity, dispersion)?, settings, control, sink)
+            go(&site, uniform(plan, velocity, &site.transport.dispersion)?, settings, control, sink)
         }
+        (Flow::Uniform(_) | Flow::Expression(_), _) => go(&site, formula(&site)?, settings, control, sink),
         (
             Flow::Darcy(_) | Flow::File(_),
             Dispersion::Velocity { longitudinal, transverse, molecular, .. },
@@ -62,6 +67,48 @@ pub fn run<const D: usize>(
     }
 }
 
+fn is_constant(tape: &Tape) -> bool {
+    matches!(tape.operations[..], [Operation::Constant(_)])
+}
+
+/// A medium of expressions.
+fn formula<const D: usize>(site: &Site<D>) -> Result<Formula<D>, RunError> {
+    let constant = |value: f64| Tape { operations: vec![Operation::Constant(value)] };
+    let velocity: Vec<Tape> = match &site.transport.flow {
+        Flow::Uniform(velocity) => velocity.iter().map(|&v| constant(v)).collect(),
+        Flow::Expression(tapes) => tapes.clone(),
+        Flow::Darcy(_) | Flow::File(_) => return Err(unsound("a flow without expressions")),
+    };
+    let spreading = match &site.transport.dispersion {
+        Dispersion::Constant(triangle) => Spreading::Constant(triangle_of(triangle)?, 0.0),
+        Dispersion::Isotropic(tape) => Spreading::Isotropic(tape.clone()),
+        Dispersion::Velocity { longitudinal, transverse, molecular, .. } => Spreading::Velocity {
+            longitudinal: *longitudinal,
+            transverse: *transverse,
+            molecular: *molecular,
+        },
+    };
+    Ok(Formula {
+        axes: std::array::from_fn(|axis| site.plan.axes[axis].index),
+        velocity: velocity.try_into().map_err(|_| unsound("a velocity that does not fit the axes"))?,
+        spreading,
+        porosity: site.transport.porosity.clone(),
+        width: std::array::from_fn(|axis| site.high[axis] - site.low[axis]),
+    })
+}
+
+/// A lower triangle, row by row.
+fn triangle_of<const D: usize>(entries: &[f64]) -> Result<[[f64; D]; D], RunError> {
+    if entries.len() != D * (D + 1) / 2 {
+        return Err(unsound("a dispersion that does not fit the axes"));
+    }
+    let mut tensor = [[0.0; D]; D];
+    for (row, target) in tensor.iter_mut().enumerate() {
+        target[..=row].copy_from_slice(&entries[row * (row + 1) / 2..][..=row]);
+    }
+    Ok(tensor)
+}
+
 /// A uniform medium from constants, or from lengths along the velocity.
 fn uniform<const D: usize>(
     plan: &Plan,
@@ -71,11 +118,7 @@ fn uniform<const D: usize>(
     let mut tensor = [[0.0; D]; D];
     let mut own = 0.0;
     match dispersion {
-        Dispersion::Constant(triangle) if triangle.len() == D * (D + 1) / 2 => {
-            for (row, entries) in tensor.iter_mut().enumerate() {
-                entries[..=row].copy_from_slice(&triangle[row * (row + 1) / 2..][..=row]);
-            }
-        }
+        Dispersion::Constant(triangle) => tensor = triangle_of(triangle)?,
         Dispersion::Velocity { longitudinal, transverse, molecular, .. } => {
             let speed = velocity.iter().map(|v| v * v).sum::<f64>().sqrt();
             own = *molecular;
@@ -89,7 +132,7 @@ fn uniform<const D: usize>(
                 }
             }
         }
-        _ => return Err(unsound("a dispersion that does not fit the axes")),
+        Dispersion::Isotropic(_) => return Err(unsound("a dispersion that varies in a uniform medium")),
     }
     let width = std::array::from_fn(|axis| plan.axes[axis].high - plan.axes[axis].low);
     Ok(Uniform { velocity, dispersion: tensor, molecular: own, width })

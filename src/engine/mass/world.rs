@@ -5,7 +5,8 @@
 
 use super::super::error::RunError;
 use super::super::program::unsound;
-use super::super::track::medium::{Carrier, Medium};
+use super::super::track::interfaces::Interface;
+use super::super::track::medium::{Carrier, Criteria, Medium, spread_at};
 use super::super::track::noise::Draws;
 use super::super::track::tracker::Tracker;
 use super::super::track::walls::{self, Ends, Law, Wall};
@@ -70,10 +71,16 @@ impl<'a, const D: usize> Site<'a, D> {
             ends: ends.try_into().map_err(|_| unsound("sides that do not fit the axes"))?,
             planes: Vec::new(),
             draws: Draws::new(self.plan.seed, D, is_double),
-            criteria: self.transport.sub_steps.map(|sub| super::super::track::medium::Criteria {
-                courant: sub.courant,
-                dispersion: sub.dispersion,
-            }),
+            interfaces: self
+                .transport
+                .interfaces
+                .iter()
+                .map(|interface| Interface { axis: interface.axis, at: interface.at })
+                .collect(),
+            criteria: self
+                .transport
+                .sub_steps
+                .map(|sub| Criteria { courant: sub.courant, dispersion: sub.dispersion }),
             width,
         })
     }
@@ -229,7 +236,7 @@ impl<'a, const D: usize> Site<'a, D> {
             let carrier = self.carriers()[population];
             let entry = |time: f64| Entry {
                 velocity: inwards * carrier.mobility,
-                dispersion: 0.5 * spread(&tracker.medium, &carrier, centre, axis),
+                dispersion: 0.5 * spread_at(&tracker.medium, &carrier, centre, axis),
                 time,
             };
             let density = c * porosity * of.retardation * area;
@@ -281,16 +288,6 @@ impl<'a, const D: usize> Site<'a, D> {
         }
         faces
     }
-}
-
-/// `2 D_nn` of a carrier at a place.
-fn spread<const D: usize, M: Medium<D>>(medium: &M, carrier: &Carrier, place: [f64; D], axis: usize) -> f64 {
-    let lanes = place.map(|x| [x; super::super::track::lanes::LANES]);
-    let mut look = medium.blank();
-    medium.look(carrier, &lanes, &mut look);
-    let mut spread = lanes[0];
-    medium.spread_along(&look, axis, &mut spread);
-    spread[0]
 }
 
 fn law(rule: &SideRule) -> Law {

@@ -417,6 +417,14 @@ impl<const D: usize> Medium<D> for CellMedium<D> {
         }
     }
 
+    fn drift(&self, look: &Look<D>, axis: usize, lane: usize) -> f64 {
+        f64::from(look.drift[axis][lane])
+    }
+
+    fn porosity(&self, _: [f64; D]) -> f64 {
+        1.0
+    }
+
     fn velocity(&self, place: [f64; D], axis: usize) -> f64 {
         let mut around = Around::new();
         self.gather(&place.map(|x| [x; LANES]), &mut around);

@@ -3,6 +3,8 @@
 //! Owns the trait that the walk is generic over. May use lanes. It deliberately names no medium: each has
 //! its own file and its own compiled loop.
 
+#![allow(clippy::needless_range_loop)] // Loops over lanes are hot.
+
 use super::lanes::{LANES, Lane, Narrow};
 
 /// What of a population changes its walk.
@@ -85,6 +87,27 @@ pub trait Medium<const D: usize>: Sync {
     /// Longest times that the criteria allow, s.
     fn longest(&self, look: &Self::Look, criteria: &Criteria, time: &mut Lane);
 
+    /// Drift `A` of one particle along an axis, m/s.
+    fn drift(&self, look: &Self::Look, axis: usize, lane: usize) -> f64;
+
+    /// Porosity at one place, up to a factor that is the same everywhere.
+    fn porosity(&self, place: [f64; D]) -> f64;
+
     /// Velocity of the water along an axis at one place, m/s.
     fn velocity(&self, place: [f64; D], axis: usize) -> f64;
+}
+
+/// `2 D_nn` of a carrier normal to an axis at one place, m²/s.
+pub fn spread_at<const D: usize, M: Medium<D>>(
+    medium: &M,
+    carrier: &Carrier,
+    place: [f64; D],
+    axis: usize,
+) -> f64 {
+    let lanes = place.map(|x| [x; LANES]);
+    let mut look = medium.blank();
+    medium.look(carrier, &lanes, &mut look);
+    let mut spread = [0.0; LANES];
+    medium.spread_along(&look, axis, &mut spread);
+    spread[0]
 }

@@ -5,6 +5,9 @@
 //! others, in any order.
 
 pub mod cells;
+pub mod duals;
+pub mod formula;
+pub mod interfaces;
 pub mod lanes;
 pub mod medium;
 pub mod monitors;

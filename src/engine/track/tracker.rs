@@ -3,6 +3,7 @@
 //! Owns the order of work within a displacement. May use media, walls and monitors. It deliberately stores
 //! nothing: a group comes in, and goes on or leaves.
 
+use super::interfaces::Interface;
 use super::lanes::{LANES, Lane, Lanes};
 use super::medium::{Carrier, Criteria, Leap, Medium};
 use super::monitors::{Crossing, Plane};
@@ -18,6 +19,7 @@ pub struct Tracker<const D: usize, M: Medium<D>> {
     pub medium: M,
     pub ends: [Ends<D>; D],
     pub planes: Vec<Plane<D>>,
+    pub interfaces: Vec<Interface>,
     pub draws: Draws,
     /// Steps of each particle's own, if any.
     pub criteria: Option<Criteria>,
@@ -176,6 +178,9 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
             draws: &self.draws,
             step: number,
         };
+        for (idx, interface) in self.interfaces.iter().enumerate() {
+            interface.apply(idx, &stride, lanes);
+        }
         for (axis, ends) in self.ends.iter().enumerate() {
             ends.apply(axis, &stride, lanes, exits);
         }

@@ -101,6 +101,14 @@ impl<const D: usize> Medium<D> for Uniform<D> {
         time.fill((criteria.courant / courant).min(criteria.dispersion / dispersion));
     }
 
+    fn drift(&self, look: &Constants<D>, axis: usize, _: usize) -> f64 {
+        look.drift[axis]
+    }
+
+    fn porosity(&self, _: [f64; D]) -> f64 {
+        1.0
+    }
+
     fn velocity(&self, _: [f64; D], axis: usize) -> f64 {
         self.velocity[axis]
     }

@@ -78,7 +78,8 @@ fn plus(sum: &Slopes, slopes: &Slopes, factor: f64) -> Slopes {
     out
 }
 
-fn unary(operator: Unary, a: f64, value: f64) -> f64 {
+/// Derivative of `value = operator(a)`.
+pub fn unary(operator: Unary, a: f64, value: f64) -> f64 {
     match operator {
         Unary::Negate => -1.0,
         Unary::Not => 0.0,
@@ -95,7 +96,8 @@ fn unary(operator: Unary, a: f64, value: f64) -> f64 {
     }
 }
 
-fn binary(operator: Binary, a: f64, b: f64, value: f64) -> [f64; 2] {
+/// Derivatives of `value = a operator b` by `a` and by `b`.
+pub fn binary(operator: Binary, a: f64, b: f64, value: f64) -> [f64; 2] {
     match operator {
         Binary::Add => [1.0, 1.0],
         Binary::Subtract => [1.0, -1.0],
