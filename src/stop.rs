@@ -155,13 +155,15 @@ impl Place<'_> {
             Why::Negative { component, .. } => self
                 .at_rates(message, component, "takes more than there is")
                 .help("use a smaller `chemistry tolerance`"),
-            Why::NoEquilibrium { residual } => {
-                let message = self.at_equilibria(message, "in equilibrium with what the particle carries");
-                if residual >= 1.0 {
-                    return message.help("initial concentrations from which the reactions can go one way or the other work: no total may be below what its species can take");
-                }
-                message.help("use equilibrium constants and concentrations that lie nearer to each other")
-            }
+            Why::Impossible => self
+                .at_equilibria(message, "in equilibrium with what the particle carries")
+                .help("initial concentrations from which the reactions can go one way or the other work: no total may be below what its species can take"),
+            Why::Endless => self
+                .at_equilibria(message, "in equilibrium with what the particle carries")
+                .help("some minerals dissolve to the same species as others, and their constants do not go together: take one of them out, or make its constant larger"),
+            Why::NoEquilibrium { .. } => self
+                .at_equilibria(message, "in equilibrium with what the particle carries")
+                .help("use equilibrium constants and concentrations that lie nearer to each other"),
             Why::TooSalty { .. } => {
                 let message = match self.scenario.chemistry.span {
                     Some(span) => message.at(span, "the activities are chosen here"),

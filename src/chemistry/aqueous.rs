@@ -221,7 +221,8 @@ fn add_up(constant: f64, terms: &[(usize, f64)], components: &[&[f64]], column: 
 fn why(refusal: Refusal) -> Why {
     match refusal {
         Refusal::NotFinite { primary } => Why::NotFinite { component: primary },
-        Refusal::Infeasible => Why::NoEquilibrium { residual: 1.0 },
+        Refusal::Infeasible => Why::Impossible,
+        Refusal::Endless => Why::Endless,
         Refusal::IonicStrength { value } => Why::TooSalty { ionic_strength: value },
         Refusal::NotSolved { residual } => Why::NoEquilibrium { residual },
     }

@@ -119,7 +119,11 @@ pub enum Why {
         component: usize,
         value: f64,
     },
-    /// Totals have no equilibrium (residual 1), or it is not found to the last digits.
+    /// No amounts of species have these totals.
+    Impossible,
+    /// Minerals would form without end.
+    Endless,
+    /// An equilibrium is not found to the last digits.
     NoEquilibrium {
         residual: f64,
     },

@@ -223,6 +223,12 @@ impl Reactions {
             Why::Negative { component, value } => {
                 format!("`{}` would become negative ({})", name(component), precise(value))
             }
+            Why::Impossible => "no amounts of species in equilibrium have these totals".to_owned(),
+            Why::Endless => {
+                "no solution is at or below the saturation of all minerals: their constants contradict \
+                             each other"
+                    .to_owned()
+            }
             Why::NoEquilibrium { residual } => {
                 format!("no equilibrium is found (relative residual {})", precise(residual))
             }

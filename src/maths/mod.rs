@@ -4,6 +4,7 @@
 //! deliberately never calls the system's library (`f64::exp` and friends pick code by CPU).
 
 pub mod chacha;
+pub mod double;
 pub mod exact;
 pub mod fourier;
 pub mod normal;

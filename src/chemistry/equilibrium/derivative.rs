@@ -11,7 +11,7 @@ use super::system::System;
 use pulp::NullaryFnOnce;
 
 /// `ln c` of absent primaries by stage: little enough to bind nothing, and enough to have a slope.
-const LN_OF_LITTLE: [f64; 5] = [0.0, -400.0, -200.0, -100.0, -50.0];
+const LN_OF_LITTLE: [f64; 5] = [-50.0, -400.0, -200.0, -100.0, -50.0];
 
 /// One call of [`super::Speciation::derivatives`].
 pub(super) struct Derivatives<'a, 'c, C, D, M> {

@@ -27,6 +27,35 @@ pub(super) fn infeasible(system: &System, totals: &[f64]) -> Option<Vec<f64>> {
     if tableau.is_solved() { None } else { Some(tableau.proof(totals)) }
 }
 
+/// The species that no feasible amounts contain, as the totals lie on an edge of what species can make.
+///
+/// Equation: x_s is made largest over `x ≥ 0` with `ν x = T`; species of which that is 0 are absent.
+/// Symbols: as of [`infeasible`].
+/// Dimensions and range: feasible totals; else none is absent.
+/// Source: Chvátal 1983, ch. 8 (second phase).
+/// Shape: one phase per species that is not in any amounts seen before.
+pub(super) fn absent(system: &System, totals: &[f64]) -> Vec<bool> {
+    let mut tableau = Tableau::new(system, totals);
+    let n_species = tableau.n_species;
+    for _ in 0..MAX_PIVOTS {
+        let Some(column) = tableau.entering() else { break };
+        let Some(row) = tableau.leaving(column) else { break };
+        tableau.pivot(row, column);
+    }
+    if !tableau.is_solved() {
+        return vec![false; n_species];
+    }
+    tableau.drop_rests();
+    let mut is_present = vec![false; n_species];
+    for species in 0..n_species {
+        tableau.mark(&mut is_present);
+        if !is_present[species] {
+            is_present[species] = tableau.can_rise(species);
+        }
+    }
+    is_present.into_iter().map(|is_present| !is_present).collect()
+}
+
 struct Tableau {
     n_species: usize,
     /// Coefficients of species and of the rests of the totals, then the right side, then the size of what was
@@ -123,5 +152,48 @@ impl Tableau {
         let right = self.right();
         let is_rounding = |row: &Vec<f64>| row[right] <= ROUNDING * row[right + 1];
         (0..self.rows.len()).all(|idx| !self.is_rest(idx) || is_rounding(&self.rows[idx]))
+    }
+
+    /// Species in place of rests that are 0.
+    fn drop_rests(&mut self) {
+        for row in 0..self.rows.len() {
+            let column = (0..self.n_species).find(|&column| {
+                self.is_rest(row) && !self.basis.contains(&column) && self.rows[row][column].abs() > 1e-9
+            });
+            if let Some(column) = column {
+                self.pivot(row, column);
+            }
+        }
+    }
+
+    fn is_positive(&self, row: usize) -> bool {
+        let right = self.right();
+        self.rows[row][right] > ROUNDING * self.rows[row][right + 1]
+    }
+
+    fn mark(&self, is_present: &mut [bool]) {
+        for (row, &species) in self.basis.iter().enumerate() {
+            if species < self.n_species && self.is_positive(row) {
+                is_present[species] = true;
+            }
+        }
+    }
+
+    /// Whether amounts have some of a species.
+    fn can_rise(&mut self, species: usize) -> bool {
+        for _ in 0..MAX_PIVOTS {
+            let own = self.basis.iter().position(|&other| other == species);
+            let entering = match own {
+                Some(row) if self.is_positive(row) => return true,
+                Some(row) => (0..self.n_species)
+                    .find(|&column| !self.basis.contains(&column) && self.rows[row][column] < -1e-9),
+                None => Some(species),
+            };
+            let Some(column) = entering else { return false };
+            // Without a bound it rises for ever.
+            let Some(row) = self.leaving(column) else { return true };
+            self.pivot(row, column);
+        }
+        false
     }
 }

@@ -6,8 +6,9 @@
 use super::Refusal;
 use super::activity::{MAX_IONIC_STRENGTH, MIN_IONIC_STRENGTH};
 use super::fast::guess;
-use super::feasible::infeasible;
+use super::feasible::{absent, infeasible};
 use super::newton::{Newton, Outcome, Settings};
+use super::precise::Problem;
 use super::system::System;
 use crate::maths::scalar;
 
@@ -19,6 +20,10 @@ pub(super) fn solve(system: &System, newton: &mut Newton<1>) -> Result<(), Refus
     let totals: Vec<f64> = newton.point.total.iter().map(|total| total[0]).collect();
     if infeasible(system, &totals).is_some() {
         return Err(Refusal::Infeasible);
+    }
+    let none = vec![false; system.n_species()];
+    if system.n_minerals > 0 && problem(system, newton, &totals, none).endless().is_some() {
+        return Err(Refusal::Endless);
     }
     if system.is_ideal() {
         return at_fixed_activities(system, newton, MIN_IONIC_STRENGTH);
@@ -34,8 +39,21 @@ pub(super) fn solve(system: &System, newton: &mut Newton<1>) -> Result<(), Refus
 
 /// The convex problem: activities of a given ionic strength.
 fn at_fixed_activities(system: &System, newton: &mut Newton<1>, ionic: f64) -> Result<(), Refusal> {
+    let n_first = if system.n_minerals > 0 { 1 } else { 2 };
+    if by_sweeps(system, newton, ionic, &WAYS[..n_first]) {
+        return Ok(());
+    }
+    newton.point.ionic[0] = ionic;
+    let Err(refusal) = precisely(system, newton) else { return Ok(()) };
+    if by_sweeps(system, newton, ionic, &WAYS[n_first..]) { Ok(()) } else { Err(refusal) }
+}
+
+/// Sweeps of continued fractions before the iteration, and whether its steps are Newton's alone.
+const WAYS: [(usize, bool); 5] = [(0, true), (0, false), (10, true), (10, false), (100, true)];
+
+fn by_sweeps(system: &System, newton: &mut Newton<1>, ionic: f64, ways: &[(usize, bool)]) -> bool {
     let stiffnesses: &[f64] = if system.n_minerals > 0 { &[1.0, 1e-2, 1e2, 1e4] } else { &[1.0] };
-    for (n_sweeps, is_plain) in [(0, true), (0, false), (10, true), (10, false), (100, true)] {
+    for &(n_sweeps, is_plain) in ways {
         for &stiffness in stiffnesses {
             newton.settings =
                 Settings { max_evaluations: MAX_EVALUATIONS, is_plain, is_frozen: true, stiffness };
@@ -44,11 +62,49 @@ fn at_fixed_activities(system: &System, newton: &mut Newton<1>, ionic: f64) -> R
             precondition(system, newton, n_sweeps);
             newton.start(system, 0);
             if iterate(system, newton) == Outcome::Done || newton.is_nearly_solved(system, 0) {
-                return Ok(());
+                return true;
             }
         }
     }
-    Err(not_solved(newton))
+    false
+}
+
+/// The activities that the point has.
+fn problem<'a>(
+    system: &'a System,
+    newton: &Newton<1>,
+    totals: &'a [f64],
+    is_absent: Vec<bool>,
+) -> Problem<'a> {
+    let (ionic, mut constants) = (newton.point.ionic, Vec::with_capacity(system.rows.len()));
+    let root = [ionic[0].sqrt()];
+    for row in &system.rows {
+        let shapes = system.shapes.iter().zip(&row.weights);
+        let terms = shapes.map(|(shape, weight)| weight * shape.value(&ionic, &root).0[0]);
+        constants.push(row.ln_constant + terms.sum::<f64>());
+    }
+    Problem { system, totals, constants, is_absent }
+}
+
+/// In 32 digits, where 16 found no way.
+fn precisely(system: &System, newton: &mut Newton<1>) -> Result<(), Refusal> {
+    let totals: Vec<f64> = newton.point.total.iter().map(|total| total[0]).collect();
+    let ionic = newton.point.ionic;
+    guess(system, &mut newton.point, 0);
+    newton.point.ionic = ionic;
+    let start: Vec<f64> = newton.point.xi.iter().map(|xi| xi[0].max(-600.0)).collect();
+    let is_absent = absent(system, &totals);
+    let solution = problem(system, newton, &totals, is_absent).solve(&start);
+    let solution = solution.map_err(|residual| Refusal::NotSolved { residual })?;
+    let Newton { point, .. } = newton;
+    let n_aqueous = system.n_primaries + system.n_secondaries;
+    point.xi.iter_mut().zip(&solution.xi).for_each(|(xi, found)| *xi = [*found]);
+    point.amount.iter_mut().zip(&solution.values[n_aqueous..]).for_each(|(amount, found)| *amount = [*found]);
+    point.evaluate(system);
+    // What doubles make of ln c is less than what is known.
+    point.values[..n_aqueous].iter_mut().zip(&solution.values).for_each(|(value, found)| *value = [*found]);
+    point.ionic_out = [system.ionic.iter().zip(&solution.values).map(|(weight, c)| weight * c).sum()];
+    Ok(())
 }
 
 fn iterate(system: &System, newton: &mut Newton<1>) -> Outcome {

@@ -11,6 +11,7 @@
 #![allow(clippy::needless_range_loop)]
 
 mod activity;
+mod basis;
 mod closed;
 mod derivative;
 mod direction;
@@ -20,6 +21,8 @@ mod hard;
 mod lanes;
 mod newton;
 mod point;
+mod precise;
+mod quadratic;
 mod system;
 
 pub use activity::MAX_IONIC_STRENGTH;
@@ -84,6 +87,8 @@ pub enum Refusal {
     NotFinite { primary: usize },
     /// No amounts of species have these totals; proved.
     Infeasible,
+    /// No water is at or below saturation of all minerals: they would form without end; proved.
+    Endless,
     /// The model of activities holds up to [`MAX_IONIC_STRENGTH`], and this solution has more, mol/L.
     IonicStrength { value: f64 },
     /// The iteration did not end; what is left of the worst balance, relative to its terms.
