@@ -130,6 +130,7 @@ codes! {
     N104 "a step carries particles across the whole domain",
     N105 "the domain runs empty at a side",
     N106 "the step is coarse for exchange and reaction in turns",
+    N107 "the noise of bin means keeps reactants apart",
     N201 "bins without particles",
     N202 "a step cannot resolve a mixing zone",
     N203 "the bins disperse more than the scene",

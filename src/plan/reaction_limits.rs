@@ -3,16 +3,19 @@
 //! Owns these numbers and verdicts. May use `scenario` for the places. It deliberately refuses no step for
 //! being long against a reaction: sub-steps resolve that, and taking turns with exchange is what is judged.
 
+use super::chemistry::{Method, Splitting};
 use super::limits::{Limit, dispersion, short};
 use super::time_scales::TimeScales;
-use super::{Plan, ZoneRate, chemistry::Splitting};
+use super::{Plan, ZoneRate};
 use crate::diagnostic::Diagnostic;
-use crate::diagnostic::codes::{N106, N201};
+use crate::diagnostic::codes::{N106, N107, N201};
 use crate::scenario::Scenario;
 
 /// Relative error of taking turns above which it shows.
 const VISIBLE_SPLITTING: f64 = 0.1;
 
+/// Part of a reactant that the noise of means keeps from its partner above which it shows.
+const VISIBLE_NOISE: f64 = 0.03;
 /// Particles per bin below which what lives in bins meets too few.
 const FEW_PER_BIN: f64 = 10.0;
 
@@ -26,6 +29,7 @@ pub(super) fn check(
     if plan.has_immobile() {
         particles_per_bin(scenario, plan, diagnostics);
     }
+    noise_of_means(scenario, plan, limits, diagnostics);
     let (Some(scales), Some(kinetics)) =
         (scales, plan.chemistry.as_ref().and_then(|chemistry| chemistry.kinetics.as_ref()))
     else {
@@ -141,6 +145,58 @@ fn splitting(
         message = message.also(reaction.span, format!("the fastest reaction: 1/k = {} s", short(1.0 / rate)));
     }
     diagnostics.push(message);
+}
+
+/// What well-mixed reactants leave of each other, as their means over a bin are those of few particles.
+///
+/// - Equation: `E|k − n/2| / (n/2) = √(2/(π n))`, k of n particles with one reactant, the others with the other.
+/// - Symbols: n particles per bin.
+/// - Dimensions and range: relative to the reactants before a complete reaction in the proportion in which they react;
+///   a product of means is less by 1/n only, and one that is never complete is between the two. Zones with a rate hold
+///   other means from step to step and are free of it.
+/// - Source: the mean deviation of the binomial distribution for many particles; docs/methods.md.
+/// - Shape: one number.
+fn noise_of_means(
+    scenario: &Scenario,
+    plan: &Plan,
+    limits: &mut Vec<Limit>,
+    diagnostics: &mut Vec<Diagnostic>,
+) {
+    let n_bins: f64 = plan.axes.iter().map(|axis| axis.bins as f64).product();
+    let is_moving = plan.walk.drift.iter().chain(&plan.walk.spread).any(|entry| *entry != 0.0);
+    let is_well_mixed = plan.mixing.as_ref().is_some_and(|mixing| mixing.is_well_mixed);
+    if !is_well_mixed || !is_moving || n_bins <= 1.0 {
+        return;
+    }
+    let kinetics = plan.chemistry.as_ref().and_then(|chemistry| chemistry.kinetics.as_ref());
+    let is_linear = |method: Method| matches!(method, Method::Observed | Method::Exponential | Method::Zero);
+    if plan.reactions.is_empty() && kinetics.is_none_or(|kinetics| is_linear(kinetics.method)) {
+        return;
+    }
+    let of = |per_bin: f64| (std::f64::consts::FRAC_2_PI / per_bin).sqrt();
+    let value = of(plan.particles.count as f64 / n_bins);
+    limits.push(Limit {
+        name: "reactants that the noise of bin means keeps apart".into(),
+        formula: "sqrt(2 / (pi n)), n particles per bin",
+        value,
+        advice: "at most, where reactants are in balance; below 0.03; falls with the root of the particles",
+    });
+    if value <= VISIBLE_NOISE {
+        return;
+    }
+    let per_bin = std::f64::consts::FRAC_2_PI / (VISIBLE_NOISE * VISIBLE_NOISE);
+    let span = scenario.bins.as_ref().map_or(scenario.domain.span, |bins| bins.span);
+    let affordable = (plan.particles.count as f64 / per_bin).floor();
+    let fewer_bins =
+        if affordable >= 1.0 { format!(", or at most {affordable} bins in all") } else { String::new() };
+    diagnostics.push(
+        Diagnostic::warning(N107, "the noise of bin means keeps reactants apart")
+            .at(scenario.particles.count_span, format!("{} particles", plan.particles.count))
+            .also(span, format!("{n_bins} bins"))
+            .found(format!("up to {} of reactants in balance are left", short(value)))
+            .expected(format!("at most {VISIBLE_NOISE}"))
+            .help(format!("use at least {} particles{fewer_bins}", (n_bins * per_bin).ceil())),
+    );
 }
 
 fn particles_per_bin(scenario: &Scenario, plan: &Plan, diagnostics: &mut Vec<Diagnostic>) {
