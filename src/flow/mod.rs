@@ -3,10 +3,13 @@
 //! Owns the discharge through faces, and what makes it: solvers and readers. May use the words and the
 //! plan. It deliberately moves nothing: the engine does.
 
+pub mod balance;
 pub mod cells;
 pub mod darcy;
 pub mod random_field;
+pub mod read;
 
+pub use balance::Balance;
 pub use cells::Cells;
 
 /// The discharge of water through the faces of cells.

@@ -1,0 +1,211 @@
+//! Comma-separated text (RFC 4180) with a line of names.
+//!
+//! Owns quoting, comments and numbers. May use the tables. It deliberately guesses nothing: another
+//! separator or a decimal comma is a message and not a try.
+
+use super::error::{Kind, Place, ReadError};
+use super::table::{Frame, Layout, Raw, RowPlaces, axis_of, no_column};
+use crate::flow::FaceFlow;
+use std::borrow::Cow;
+
+/// The flow of a table as text. Lines that start with `#` and empty lines are passed over; the first other
+/// line names the columns.
+pub fn flow(bytes: &[u8], layout: &Layout, frame: &Frame) -> Result<FaceFlow, ReadError> {
+    layout.flow(raw(bytes, layout)?, frame)
+}
+
+fn raw(bytes: &[u8], layout: &Layout) -> Result<Raw, ReadError> {
+    let mut reader = Reader::new(text(bytes)?);
+    let Some(names) = reader.record()? else {
+        return Err(ReadError::new(Kind::Missing, "the file has no line with the names of columns"));
+    };
+    check_separator(&names)?;
+    let column = |name: &str| {
+        let mut found = names.iter().enumerate().filter(|(_, field)| field.text.trim() == name);
+        let (idx, _) = found.next().ok_or_else(|| {
+            no_column(name, names.iter().map(|field| field.text.trim())).at(names[0].place())
+        })?;
+        match found.next() {
+            None => Ok(idx),
+            Some((_, again)) => {
+                Err(ReadError::new(Kind::Mismatch, format!("two columns are named `{name}`"))
+                    .at(again.place()))
+            }
+        }
+    };
+    let wanted: Vec<usize> =
+        layout.numeric().iter().map(|wanted| column(&wanted.name)).collect::<Result<_, _>>()?;
+    let normal = layout.normal().map(column).transpose()?;
+    let mut raw = Raw { numbers: vec![Vec::new(); wanted.len()], ..Raw::default() };
+    let mut lines = Vec::new();
+    let n_columns = names.len();
+    let names: Vec<String> = names.iter().map(|field| field.text.trim().to_owned()).collect();
+    while let Some(record) = reader.record()? {
+        if record.len() != n_columns {
+            let message = format!("{} fields, the line of names has {n_columns}", record.len());
+            return Err(
+                ReadError::new(Kind::Damaged, message).at(record[record.len().min(n_columns) - 1].place())
+            );
+        }
+        for (&idx, numbers) in wanted.iter().zip(&mut raw.numbers) {
+            numbers.push(number(&record[idx], &names[idx])?);
+        }
+        if let Some(idx) = normal {
+            raw.normals.push(axis_of(&record[idx].text).ok_or_else(|| {
+                let message = format!("`{}` in column `{}` is no axis", record[idx].shown(), names[idx]);
+                ReadError::new(Kind::Value, message).at(record[idx].place()).help("write x, y or z")
+            })?);
+        }
+        lines.push(record[0].line);
+    }
+    raw.places = RowPlaces::Lines(lines);
+    Ok(raw)
+}
+
+fn text(bytes: &[u8]) -> Result<&str, ReadError> {
+    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    std::str::from_utf8(bytes).map_err(|error| {
+        let place = Place::Byte(error.valid_up_to());
+        ReadError::new(Kind::Foreign, "the file is not text in UTF-8").at(place)
+    })
+}
+
+/// The usual slip: one column whose name is the whole line.
+fn check_separator(names: &[Field]) -> Result<(), ReadError> {
+    let [only] = names else { return Ok(()) };
+    let Some(found) = [';', '\t'].into_iter().find(|&c| only.text.contains(c)) else { return Ok(()) };
+    let name = if found == ';' { "semicolons" } else { "tabulators" };
+    Err(ReadError::new(Kind::Unsupported, format!("the columns are separated by {name}"))
+        .at(only.place())
+        .help("separate columns by commas, and write decimal points"))
+}
+
+/// A decimal number; what Rust reads beyond that (`inf`, `nan`) is none.
+fn number(field: &Field, column: &str) -> Result<f64, ReadError> {
+    let text = field.text.trim();
+    let is_decimal = text.bytes().all(|c| c.is_ascii_digit() || b"+-.eE".contains(&c));
+    if let Some(number) = text.parse::<f64>().ok().filter(|number| is_decimal && number.is_finite()) {
+        return Ok(number);
+    }
+    let wrong = |message: String| ReadError::new(Kind::Value, message).at(field.place());
+    if text.is_empty() {
+        return Err(wrong(format!("column `{column}` is empty here")));
+    }
+    let error = wrong(format!("`{}` in column `{column}` is no finite number", field.shown()));
+    let with_e = text.replace(['d', 'D'], "e");
+    Err(if text.replacen(',', ".", 1).parse::<f64>().is_ok() {
+        error.help("write a decimal point")
+    } else if with_e.parse::<f64>().is_ok() {
+        error.help(format!("write `{with_e}`"))
+    } else {
+        error
+    })
+}
+
+struct Field<'a> {
+    text: Cow<'a, str>,
+    line: u32,
+    column: u32,
+}
+
+impl Field<'_> {
+    fn place(&self) -> Place {
+        Place::Text { line: self.line as usize, column: self.column as usize }
+    }
+
+    /// For messages: short, and nothing that steers a terminal.
+    fn shown(&self) -> String {
+        let clean = |c: char| if c.is_control() { '?' } else { c };
+        self.text.trim().chars().take(40).map(clean).collect()
+    }
+}
+
+struct Reader<'a> {
+    rest: &'a str,
+    line: u32,
+    column: u32,
+}
+
+impl<'a> Reader<'a> {
+    fn new(text: &'a str) -> Self {
+        Self { rest: text, line: 1, column: 1 }
+    }
+
+    /// The fields of the next line that has any; a line may go on in a quoted field.
+    fn record(&mut self) -> Result<Option<Vec<Field<'a>>>, ReadError> {
+        loop {
+            if self.rest.is_empty() {
+                return Ok(None);
+            }
+            let (line, _) = self.rest.split_once('\n').unwrap_or((self.rest, ""));
+            if !line.starts_with('#') && !line.trim().is_empty() {
+                break;
+            }
+            self.skip(line.len());
+            self.end_line();
+        }
+        let mut fields = Vec::new();
+        loop {
+            fields.push(self.field()?);
+            if self.rest.starts_with(',') {
+                self.skip(1);
+                continue;
+            }
+            if !self.end_line() {
+                let message = "text follows a closing quote";
+                return Err(ReadError::new(Kind::Damaged, message)
+                    .at(self.place())
+                    .help("a quote within quotes is written twice"));
+            }
+            return Ok(Some(fields));
+        }
+    }
+
+    fn field(&mut self) -> Result<Field<'a>, ReadError> {
+        let (line, column) = (self.line, self.column);
+        if !self.rest.starts_with('"') {
+            let end = self.rest.find([',', '\n']).unwrap_or(self.rest.len());
+            let text = &self.rest[..end];
+            self.skip(text.strip_suffix('\r').unwrap_or(text).len());
+            return Ok(Field { text: Cow::Borrowed(text.trim_end_matches('\r')), line, column });
+        }
+        let open = self.place();
+        let mut text = String::new();
+        self.skip(1);
+        loop {
+            let Some(end) = self.rest.find('"') else {
+                return Err(ReadError::new(Kind::Damaged, "this quote is never closed").at(open));
+            };
+            text.push_str(&self.rest[..end]);
+            self.skip(end + 1);
+            if !self.rest.starts_with('"') {
+                return Ok(Field { text: Cow::Owned(text), line, column });
+            }
+            text.push('"');
+            self.skip(1);
+        }
+    }
+
+    fn place(&self) -> Place {
+        Place::Text { line: self.line as usize, column: self.column as usize }
+    }
+
+    /// Passes over bytes, which may hold ends of lines inside quotes.
+    fn skip(&mut self, n: usize) {
+        for c in self.rest[..n].chars() {
+            (self.line, self.column) =
+                if c == '\n' { (self.line + 1, 1) } else { (self.line, self.column + 1) };
+        }
+        self.rest = &self.rest[n..];
+    }
+
+    /// Passes over the end of a line, or tells that something else stands here.
+    fn end_line(&mut self) -> bool {
+        let rest = self.rest.strip_prefix('\r').unwrap_or(self.rest);
+        let Some(rest) = rest.strip_prefix('\n').or_else(|| rest.is_empty().then_some(rest)) else {
+            return false;
+        };
+        (self.rest, self.line, self.column) = (rest, self.line + 1, 1);
+        true
+    }
+}

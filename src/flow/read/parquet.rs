@@ -1,0 +1,129 @@
+//! Parquet tables of other programs.
+//!
+//! Owns the choice of columns and their types. May use the tables. It deliberately reads flat columns of
+//! numbers only, batch by batch.
+
+use super::error::{Kind, Place, ReadError};
+use super::table::{Frame, Layout, Raw, RowPlaces, axis_of, no_column};
+use crate::flow::FaceFlow;
+use arrow_array::cast::AsArray;
+use arrow_array::types::{
+    Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type, UInt32Type,
+    UInt64Type,
+};
+use arrow_array::{Array, ArrayRef};
+use arrow_schema::DataType;
+use bytes::Bytes;
+use parquet::arrow::ProjectionMask;
+use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
+
+/// The flow of a Parquet table.
+pub fn flow(bytes: Vec<u8>, layout: &Layout, frame: &Frame) -> Result<FaceFlow, ReadError> {
+    if !bytes.starts_with(b"PAR1") {
+        return Err(ReadError::new(Kind::Foreign, "this is no Parquet file"));
+    }
+    layout.flow(raw(bytes.into(), layout)?, frame)
+}
+
+fn raw(bytes: Bytes, layout: &Layout) -> Result<Raw, ReadError> {
+    // The types of the columns are those of Parquet: what a writer noted besides is of no use here.
+    let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
+    let builder =
+        ParquetRecordBatchReaderBuilder::try_new_with_options(bytes, options).map_err(|why| damaged(&why))?;
+    let schema = builder.schema().clone();
+    let known = || schema.fields().iter().map(|field| field.name().as_str());
+    let column = |name: &str| known().position(|own| own == name).ok_or_else(|| no_column(name, known()));
+    let wanted: Vec<usize> =
+        layout.numeric().iter().map(|wanted| column(&wanted.name)).collect::<Result<_, _>>()?;
+    let normal = layout.normal().map(column).transpose()?;
+    let mask = ProjectionMask::roots(builder.parquet_schema(), wanted.iter().copied().chain(normal));
+    let reader = builder.with_projection(mask).with_batch_size(8192).build().map_err(|why| damaged(&why))?;
+    let name = |idx: usize| schema.field(idx).name().as_str();
+    let mut raw =
+        Raw { numbers: vec![Vec::new(); wanted.len()], places: RowPlaces::Counted, ..Raw::default() };
+    let mut n_rows = 0;
+    for batch in reader {
+        let batch = batch.map_err(|why| damaged(&why))?;
+        let of = |idx: usize| batch.column_by_name(name(idx)).ok_or_else(|| no_column(name(idx), known()));
+        for (&idx, numbers) in wanted.iter().zip(&mut raw.numbers) {
+            let array = of(idx)?;
+            check(array, name(idx), n_rows, numbers.len())?;
+            push(array, name(idx), n_rows, numbers)?;
+        }
+        if let Some(idx) = normal {
+            push_normals(of(idx)?, name(idx), n_rows, &mut raw.normals)?;
+        }
+        n_rows += batch.num_rows();
+    }
+    Ok(raw)
+}
+
+fn damaged(why: &dyn std::fmt::Display) -> ReadError {
+    let why: String = why.to_string().chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+    let error = ReadError::new(Kind::Damaged, format!("the Parquet file cannot be read: {why}"));
+    if why.contains("Disabled feature") {
+        let help = "write it with zstd, snappy or no compression";
+        return ReadError { kind: Kind::Unsupported, ..error }.help(help);
+    }
+    error
+}
+
+fn check(array: &ArrayRef, name: &str, before: usize, n_own: usize) -> Result<(), ReadError> {
+    debug_assert_eq!(before, n_own);
+    match array.nulls().and_then(|nulls| nulls.iter().position(|is_there| !is_there)) {
+        None => Ok(()),
+        Some(row) => Err(ReadError::new(Kind::Value, format!("column `{name}` is empty here"))
+            .at(Place::Row(before + row + 1))),
+    }
+}
+
+/// Appends a column as doubles.
+fn push(array: &ArrayRef, name: &str, before: usize, numbers: &mut Vec<f64>) -> Result<(), ReadError> {
+    macro_rules! widened {
+        ($kind:ty) => {
+            numbers.extend(array.as_primitive::<$kind>().values().iter().map(|&value| value as f64))
+        };
+    }
+    match array.data_type() {
+        DataType::Float64 => widened!(Float64Type),
+        DataType::Float32 => widened!(Float32Type),
+        DataType::Int8 => widened!(Int8Type),
+        DataType::Int16 => widened!(Int16Type),
+        DataType::Int32 => widened!(Int32Type),
+        DataType::Int64 => widened!(Int64Type),
+        DataType::UInt8 => widened!(UInt8Type),
+        DataType::UInt16 => widened!(UInt16Type),
+        DataType::UInt32 => widened!(UInt32Type),
+        DataType::UInt64 => widened!(UInt64Type),
+        other => {
+            let message = format!("column `{name}` holds {other}, not numbers");
+            return Err(ReadError::new(Kind::Value, message));
+        }
+    }
+    match numbers[before..].iter().position(|number| !number.is_finite()) {
+        None => Ok(()),
+        Some(row) => {
+            let message = format!("column `{name}` is {} here", numbers[before + row]);
+            Err(ReadError::new(Kind::Value, message).at(Place::Row(before + row + 1)))
+        }
+    }
+}
+
+fn push_normals(array: &ArrayRef, name: &str, before: usize, normals: &mut Vec<u8>) -> Result<(), ReadError> {
+    let texts: Vec<Option<&str>> = match array.data_type() {
+        DataType::Utf8 => array.as_string::<i32>().iter().collect(),
+        DataType::LargeUtf8 => array.as_string::<i64>().iter().collect(),
+        DataType::Utf8View => array.as_string_view().iter().collect(),
+        other => {
+            let message = format!("column `{name}` holds {other}, not text");
+            return Err(ReadError::new(Kind::Value, message).help("write x, y or z"));
+        }
+    };
+    for (row, text) in texts.into_iter().enumerate() {
+        normals.push(text.and_then(axis_of).ok_or_else(|| {
+            let message = format!("column `{name}` names no axis here");
+            ReadError::new(Kind::Value, message).at(Place::Row(before + row + 1)).help("write x, y or z")
+        })?);
+    }
+    Ok(())
+}
