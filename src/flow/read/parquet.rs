@@ -16,20 +16,25 @@ use arrow_schema::DataType;
 use bytes::Bytes;
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
+use parquet::file::metadata::ParquetMetaData;
 
 /// The flow of a Parquet table.
 pub fn flow(bytes: Vec<u8>, layout: &Layout, frame: &Frame) -> Result<FaceFlow, ReadError> {
     if !bytes.starts_with(b"PAR1") {
         return Err(ReadError::new(Kind::Foreign, "this is no Parquet file"));
     }
-    layout.flow(raw(bytes.into(), layout)?, frame)
+    // The library stops at an index out of bounds in some damaged files.
+    let raw = std::panic::catch_unwind(|| raw(bytes.into(), layout));
+    layout.flow(raw.unwrap_or_else(|_| Err(damaged(&"a page contradicts itself")))?, frame)
 }
 
 fn raw(bytes: Bytes, layout: &Layout) -> Result<Raw, ReadError> {
+    let n_bytes = bytes.len() as i64;
     // The types of the columns are those of Parquet: what a writer noted besides is of no use here.
     let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
     let builder =
         ParquetRecordBatchReaderBuilder::try_new_with_options(bytes, options).map_err(|why| damaged(&why))?;
+    check_places(builder.metadata(), n_bytes)?;
     let schema = builder.schema().clone();
     let known = || schema.fields().iter().map(|field| field.name().as_str());
     let column = |name: &str| known().position(|own| own == name).ok_or_else(|| no_column(name, known()));
@@ -56,6 +61,22 @@ fn raw(bytes: Bytes, layout: &Layout) -> Result<Raw, ReadError> {
         n_rows += batch.num_rows();
     }
     Ok(raw)
+}
+
+/// Where the footer says that columns lie; the library takes its word for it.
+fn check_places(metadata: &ParquetMetaData, n_bytes: i64) -> Result<(), ReadError> {
+    for group in metadata.row_groups() {
+        for column in group.columns() {
+            let start = column.dictionary_page_offset().unwrap_or_else(|| column.data_page_offset());
+            let length = column.compressed_size();
+            let fits =
+                start >= 0 && length >= 0 && start.checked_add(length).is_some_and(|end| end <= n_bytes);
+            if !fits || column.num_values() < 0 || group.num_rows() < 0 {
+                return Err(damaged(&"its footer names places outside the file"));
+            }
+        }
+    }
+    Ok(())
 }
 
 fn damaged(why: &dyn std::fmt::Display) -> ReadError {

@@ -173,7 +173,7 @@ fn written(columns: Vec<(&str, ArrayRef)>, compression: Compression) -> Vec<u8> 
     file
 }
 
-fn sound(qx: Vec<Option<f64>>, compression: Compression) -> Vec<u8> {
+pub(super) fn sound(qx: Vec<Option<f64>>, compression: Compression) -> Vec<u8> {
     let columns: Vec<(&str, ArrayRef)> = vec![
         ("note", Arc::new(StringArray::from(vec!["a", "b", "c", "d"]))),
         ("x", Arc::new(Int32Array::from(vec![1, 1, 3, 3]))),
