@@ -15,7 +15,7 @@ use super::laws::{Basis, System};
 use super::matrix::Symbolic;
 use super::rosenbrock::Rosenbrock;
 use crate::maths::wide::Width;
-use crate::plan::chemistry::{Chemistry, Kinetics, Law, Method};
+use crate::plan::chemistry::{Chemistry, Equilibrium, Kinetics, Law, Method};
 use crate::plan::{Plan, Species};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -295,8 +295,8 @@ impl Integrator {
         let small: Vec<f64> = (0..n)
             .map(|component| tolerance * chemistry.floors.get(component).copied().unwrap_or(0.0).max(1e-250))
             .collect();
-        if let Some(aqueous) = aqueous {
-            return Self::mixed(plan, (tolerance, small), kinetics, aqueous);
+        if let (Some(aqueous), Some(equilibrium)) = (aqueous, &chemistry.equilibrium) {
+            return Self::mixed(plan, (tolerance, small), kinetics, (aqueous, equilibrium));
         }
         let system = || System::new(kinetics, &plan.species, n, Basis::Components, &small);
         Ok(match kinetics.method {
@@ -318,7 +318,7 @@ impl Integrator {
                 let changes: Vec<Vec<(usize, f64)>> =
                     kinetics.reactions.iter().map(|reaction| reaction.changes.clone()).collect();
                 let symbolic = Symbolic::new(n, &system.pattern);
-                // What is faded out near zero is stiff there.
+                // What is faded out near zero is stiff there; plans that were compiled say so themselves.
                 let is_explicit = kinetics.method == Method::Explicit && !system.is_gated;
                 let invariants = Invariants::new(n, &changes);
                 let network = Box::new(Network { system, invariants, small, tolerance });
@@ -334,10 +334,10 @@ impl Integrator {
         plan: &Plan,
         (tolerance, small): (f64, Vec<f64>),
         kinetics: &Kinetics,
-        aqueous: &Aqueous,
+        (aqueous, equilibrium): (&Aqueous, &Equilibrium),
     ) -> Result<Self, String> {
         let n = plan.components.len();
-        let mut system = System::new(kinetics, &plan.species, n, Basis::Species, &small)?;
+        let mut system = System::new(kinetics, &plan.species, n, Basis::Species(equilibrium), &small)?;
         aqueous.mark_signs(&mut system.is_positive);
         let changes: Vec<Vec<(usize, f64)>> =
             kinetics.reactions.iter().map(|reaction| reaction.changes.clone()).collect();

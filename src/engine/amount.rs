@@ -31,6 +31,11 @@ impl Amount {
         })
     }
 
+    /// Of what lives in bins, as if particles carried it.
+    pub fn of_bins(sum: f64) -> Self {
+        Self { sum, size: sum.abs(), lowest: sum, highest: sum }
+    }
+
     fn add(self, other: Self) -> Self {
         Self {
             sum: self.sum + other.sum,

@@ -65,12 +65,12 @@ fn reduce(rows: &mut [Vec<f64>]) -> Vec<usize> {
 }
 
 /// Per component the largest relative defect of the invariants that it takes part in, against what there
-/// was or was added: changes that are small against both are known no better than these.
-pub fn defects(invariants: &[Vec<f64>], added: &[Added], amounts: &[f64]) -> Vec<f64> {
+/// was, or has been added at most: how much has gone to and fro does not count.
+pub fn defects(invariants: &[Vec<f64>], added: &[Added], peaks: &[f64], amounts: &[f64]) -> Vec<f64> {
     let mut defects = vec![0.0; added.len()];
     for vector in invariants {
         let sum: f64 = vector.iter().zip(added).map(|(l, added)| l * added.sum).sum();
-        let sizes = added.iter().zip(amounts).map(|(added, amount)| added.size.max(*amount));
+        let sizes = peaks.iter().zip(amounts).map(|(peak, amount)| peak.max(*amount));
         let size: f64 = vector.iter().zip(sizes).map(|(l, size)| l.abs() * size).sum();
         let defect = if size > 0.0 { sum.abs() / size } else { sum.abs() };
         for (own, _) in defects.iter_mut().zip(vector).filter(|(_, l)| **l != 0.0) {
@@ -102,11 +102,13 @@ mod tests {
     fn what_is_lost_is_seen() {
         let added = |sum: f64| Added { sum, size: sum.abs() };
         let invariants = [vec![1.0, 0.0, 1.0]];
-        let none = [0.0; 3];
-        assert_eq!(defects(&invariants, &[added(-1.0), added(5.0), added(1.0)], &none), [0.0; 3]);
-        let lost = defects(&invariants, &[added(-1.0), added(5.0), added(0.75)], &none);
-        assert_eq!(lost, [0.25 / 1.75, 0.0, 0.25 / 1.75]);
-        let seen = defects(&invariants, &[added(-1.0), added(5.0), added(0.75)], &[9.0, 0.0, 1.0]);
+        let (none, peaks) = ([0.0; 3], [1.0, 5.0, 1.0]);
+        assert_eq!(defects(&invariants, &[added(-1.0), added(5.0), added(1.0)], &peaks, &none), [0.0; 3]);
+        let lost = defects(&invariants, &[added(-1.0), added(5.0), added(0.75)], &peaks, &none);
+        assert_eq!(lost, [0.25 / 2.0, 0.0, 0.25 / 2.0]);
+        // However often it went to and fro.
+        let moved = |sum: f64| Added { sum, size: 1e6 };
+        let seen = defects(&invariants, &[moved(-1.0), moved(5.0), moved(0.75)], &peaks, &[9.0, 0.0, 1.0]);
         assert_eq!(seen, [0.25 / 10.0, 0.0, 0.25 / 10.0]);
     }
 }

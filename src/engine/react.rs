@@ -91,7 +91,8 @@ impl<const D: usize> Reaction<'_, D> {
     ///
     /// - Equation: `U = Σ_i η_i W_i`; `U → U'` by the laws; `W_i ← W_i + (U' − U)`.
     /// - Symbols: `W_i` the value of zone `i`, `η_i` its fraction, ū for an instant zone.
-    /// - Range: `U ≥ 0`, or what [`Reversal`] makes of it; a zone may be below zero though the particle is not.
+    /// - Range: any `U`, with what [`Reversal`] makes of one below zero; a zone may be below zero though the
+    ///   particle is not.
     /// - Source: Sole-Mari et al. (2020): the same reaction in every zone; methods, sections 7.1 and 7.2.
     /// - Shape: columns of one chunk.
     pub fn react(&self, chunk: Chunk<'_, D>, bench: &mut Bench, sums: &mut [f64]) -> Result<(), Failure> {
@@ -105,6 +106,7 @@ impl<const D: usize> Reaction<'_, D> {
         }
         if let Some(reversal) = self.reversal {
             reversal.apply(&mut bench.values, n);
+            reversal.carry(&mut bench.values, &mut bench.before, n);
         }
         let places = self.places(positions);
         let mut values: Vec<&mut [f64]> = bench.values.iter_mut().map(|column| &mut column[..n]).collect();
@@ -236,10 +238,11 @@ impl<const D: usize> Reaction<'_, D> {
     fn leave(&self, slots: &[i32], bench: &mut Bench, sums: &mut [f64], n: usize) {
         let first = self.program.n_components();
         let n_immobile = self.immobile.len();
+        let n_bins = self.program.grid.n_bins();
         let (before, after) = (&bench.before[first..], &bench.values[first..]);
         for j in 0..n_immobile {
             let mut added = Added::default();
-            for idx in 0..n {
+            for idx in (0..n).filter(|&idx| (slots[idx] as usize) < n_bins) {
                 let change = after[j][idx] - before[j][idx];
                 sums[slots[idx] as usize * n_immobile + j] += change;
                 added.sum += change;

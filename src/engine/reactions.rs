@@ -14,17 +14,21 @@ use super::{initial, parallel};
 use crate::chemistry::{Batch, Observed, Reactor, Reversal, Scratch, Why, Work as Labour};
 use crate::diagnostic::precise;
 use crate::plan::Plan;
-use crate::plan::chemistry::Splitting;
+use crate::plan::chemistry::{Kinetic, Splitting};
 use crate::state::particles::{Block, CHUNK};
 use std::sync::{Mutex, PoisonError};
 
 /// The chemistry of a run.
 pub struct Reactions {
     reactor: Option<Reactor>,
+    /// For bins without particles: only what lives there reacts, with itself.
+    resting: Option<Reactor>,
     observed: Option<Observed>,
     pub speciation: Option<Speciation>,
     /// With zones: what is taken back where others have used up a mean.
     pub reversal: Option<Reversal>,
+    /// The same as observations see it.
+    pub shown: Option<Reversal>,
     is_symmetric: bool,
     /// Over which the particles still have to react, at the positions that they have now.
     spans: Vec<Span>,
@@ -35,6 +39,8 @@ pub struct Reactions {
     pub immobile_before: Vec<f64>,
     /// Per component.
     pub added: Vec<Added>,
+    /// Per component the largest size that the sum of what was added has had.
+    pub peaks: Vec<f64>,
     /// Of everything that was integrated.
     pub labour: Labour,
 }
@@ -109,18 +115,25 @@ impl Reactions {
             }
         }
         let immobile = initial::immobile(program)?;
+        let resting = match reactor.is_some() && !immobile.is_empty() {
+            true => resting(plan).map_err(|what| unsound(&what))?,
+            false => None,
+        };
         let splitting = plan.chemistry.as_ref().map(|chemistry| chemistry.splitting);
         Ok(Self {
             reactor,
+            resting,
             observed: Observed::new(plan).map_err(|what| unsound(&what))?,
             speciation: Speciation::new(plan).map_err(|what| unsound(&what))?,
             reversal: Reversal::new(plan).filter(|_| program.has_mixing()),
+            shown: Reversal::shown(plan).filter(|_| program.has_mixing()),
             is_symmetric: splitting == Some(Splitting::Strang),
             spans: Vec::new(),
             step: Span { t: 0.0, dt: 0.0 },
             immobile_before: immobile.iter().map(|bins| bins.iter().sum()).collect(),
             immobile,
             added: vec![Added::default(); plan.components.len()],
+            peaks: vec![0.0; plan.components.len()],
             labour: Labour::default(),
         })
     }
@@ -129,15 +142,18 @@ impl Reactions {
     pub fn copy(&self) -> Self {
         Self {
             reactor: self.reactor.clone(),
+            resting: self.resting.clone(),
             observed: self.observed.clone(),
             speciation: self.speciation.clone(),
             reversal: self.reversal.clone(),
+            shown: self.shown.clone(),
             is_symmetric: self.is_symmetric,
             spans: self.spans.clone(),
             step: self.step,
             immobile: self.immobile.clone(),
             immobile_before: self.immobile_before.clone(),
             added: self.added.clone(),
+            peaks: self.peaks.clone(),
             labour: Labour::default(),
         }
     }
@@ -192,14 +208,21 @@ impl Reactions {
             self.added.iter_mut().zip(&group.added).for_each(|(sum, part)| sum.add(*part));
             add_work(&mut self.labour, &group.labour);
         }
+        for (peak, added) in self.peaks.iter_mut().zip(&self.added) {
+            *peak = peak.max(added.sum.abs());
+        }
         let stride = self.immobile.len();
         let n_bins = program.grid.n_bins();
         let mean = program.plan.particles.count as f64 / n_bins as f64;
         for (idx, bins) in self.immobile.iter_mut().enumerate() {
             let changes = sums.iter().skip(idx).step_by(stride);
             for (bin, change) in bins[..n_bins].iter_mut().zip(changes) {
-                // What is used up may miss zero by rounding.
-                *bin = (*bin + change / mean).max(0.0);
+                let (before, change) = (*bin, change / mean);
+                *bin = before + change;
+                // What is used up may miss zero by rounding; more than that would be a loss, and shows.
+                if *bin < 0.0 && -*bin <= 1e-12 * before.abs() {
+                    *bin = 0.0;
+                }
             }
         }
     }
@@ -240,6 +263,22 @@ impl Reactions {
             }
         }
     }
+}
+
+/// The reactions of a plan that change nothing but what lives in bins; `None` if there are none.
+fn resting(plan: &Plan) -> Result<Option<Reactor>, String> {
+    let mut plan = plan.clone();
+    let kinetics = plan.chemistry.as_mut().and_then(|chemistry| chemistry.kinetics.as_mut());
+    let Some(kinetics) = kinetics else { return Ok(None) };
+    let is_resting = |reaction: &Kinetic| {
+        reaction.changes.iter().all(|&(k, change)| change == 0.0 || plan.components[k].is_immobile)
+    };
+    let mut is_kept = kinetics.reactions.iter().map(is_resting).collect::<Vec<_>>().into_iter();
+    let rates =
+        std::mem::take(&mut kinetics.laws.rates).into_iter().zip(std::mem::take(&mut kinetics.reactions));
+    let kept = rates.filter(|_| is_kept.next().unwrap_or(false));
+    (kinetics.laws.rates, kinetics.reactions) = kept.unzip();
+    if kinetics.reactions.is_empty() { Ok(None) } else { Reactor::new(&plan) }
 }
 
 impl<const D: usize> Run<'_, D> {
@@ -286,12 +325,11 @@ impl<const D: usize> Run<'_, D> {
         Ok(())
     }
 
-    /// What lives in a bin without particles reacts with nothing but itself.
+    /// What lives in a bin without particles reacts with nothing but itself. What it would give to the fluid
+    /// waits: nobody is there to take it.
     fn react_without_particles(&mut self, span: Span, step: u64) -> Result<(), RunError> {
         let (program, reactions) = (&self.program, &mut self.reactions);
-        let (Some(reactor), false) = (&reactions.reactor, reactions.immobile.is_empty()) else {
-            return Ok(());
-        };
+        let Some(reactor) = &reactions.resting else { return Ok(()) };
         let n_bins = program.grid.n_bins();
         let empty: Vec<usize> = (0..n_bins).filter(|&bin| self.means.counts[bin] == 0.0).collect();
         if empty.is_empty() {
@@ -327,7 +365,7 @@ impl<const D: usize> Run<'_, D> {
             for (&bin, &after) in empty.iter().zip(&values[program.n_components() + idx]) {
                 let change = (after - bins[bin]) * mean;
                 reactions.added[program.n_components() + idx].add(Added { sum: change, size: change.abs() });
-                bins[bin] = after.max(0.0);
+                bins[bin] = after;
             }
         }
         Ok(())

@@ -49,6 +49,8 @@ pub struct Run<'a, const D: usize> {
     groups: Vec<Group>,
     blocks_per_group: usize,
     before: Vec<Amount>,
+    /// What reactions conserve.
+    invariants: Vec<Vec<f64>>,
     /// Smallest value allowed per component.
     pub limits: Vec<f64>,
     pub reactions: Reactions,
@@ -98,6 +100,7 @@ pub fn run<const D: usize>(
     }
     let loop_wall = loop_clock.wall();
     let mass_defect = run.finish()?;
+    run.check_defects(&mass_defect, plan.time.n_steps.saturating_sub(1))?;
     Ok(Outcome {
         n_steps: plan.time.n_steps,
         n_particles: plan.particles.count,
@@ -135,6 +138,7 @@ impl<'a, const D: usize> Run<'a, D> {
             groups,
             blocks_per_group,
             before,
+            invariants: conserved::invariants(plan),
             limits,
             reactions,
         })
@@ -156,6 +160,7 @@ impl<'a, const D: usize> Run<'a, D> {
             groups: self.groups.iter().map(|_| Group::default()).collect(),
             blocks_per_group: self.blocks_per_group,
             before: self.before.clone(),
+            invariants: self.invariants.clone(),
             limits: self.limits.clone(),
             reactions: self.reactions.copy(),
         }
@@ -283,7 +288,28 @@ impl<'a, const D: usize> Run<'a, D> {
         if self.means.totals.iter().any(|total| !total.is_finite()) {
             return Err(self.find_non_finite(step));
         }
-        let defects = amount::defects(&self.program, &self.before, &self.reactions.added, &self.means.totals);
+        let defects = self.defects(&self.means.totals);
+        self.check_defects(&defects, step)
+    }
+
+    /// Per component the largest relative change that nothing accounts for: of what particles carry, of what
+    /// lives in bins, and of what reactions conserve.
+    fn defects(&self, sums: &[f64]) -> Vec<f64> {
+        let added = &self.reactions.added;
+        let mut defects = amount::defects(&self.program, &self.before, added, sums);
+        let in_bins = self.reactions.immobile_before.iter().zip(&self.reactions.immobile);
+        for ((before, bins), &added) in in_bins.zip(&added[self.program.n_components()..]) {
+            let amount = |sum: f64| Amount::of_bins(sum * self.per_bin());
+            let after: f64 = bins[..self.program.grid.n_bins()].iter().sum();
+            defects.push(Amount::defect_of(after * self.per_bin(), &amount(*before), added));
+        }
+        let Reactions { added, peaks, .. } = &self.reactions;
+        let reacted = conserved::defects(&self.invariants, added, peaks, &self.initial_sizes());
+        defects.iter_mut().zip(reacted).for_each(|(own, other)| *own = amount::worse(*own, other));
+        defects
+    }
+
+    fn check_defects(&self, defects: &[f64], step: u64) -> Result<(), RunError> {
         match defects.iter().position(|&defect| defect > LOST) {
             None => Ok(()),
             Some(idx) => Err(RunError::MassLost {
@@ -294,17 +320,21 @@ impl<'a, const D: usize> Run<'a, D> {
         }
     }
 
+    /// Particles per bin, on average.
+    fn per_bin(&self) -> f64 {
+        self.program.plan.particles.count as f64 / self.program.grid.n_bins() as f64
+    }
+
     fn component_name(&self, idx: usize) -> String {
         self.program.plan.components[idx].name.clone()
     }
 
     /// Per component Σ|value| at the beginning, over particles.
     fn initial_sizes(&self) -> Vec<f64> {
-        let (program, plan) = (&self.program, self.program.plan);
+        let program = &self.program;
         let n_slots = program.roles.len();
         let carried = (0..program.n_components()).map(|component| self.before[component * n_slots].size);
-        let per_bin = plan.particles.count as f64 / program.grid.n_bins() as f64;
-        let in_bins = self.reactions.immobile_before.iter().map(|sum| sum * per_bin);
+        let in_bins = self.reactions.immobile_before.iter().map(|sum| sum * self.per_bin());
         carried.chain(in_bins).collect()
     }
 
@@ -370,12 +400,7 @@ impl<'a, const D: usize> Run<'a, D> {
         self.settle_pending(self.program.plan.time.n_steps.saturating_sub(1))?;
         let after: Vec<f64> =
             amount::amounts(&self.blocks, self.program.n_columns()).iter().map(|amount| amount.sum).collect();
-        let mut defects = amount::defects(&self.program, &self.before, &self.reactions.added, &after);
-        defects.resize(self.program.plan.components.len(), 0.0);
-        let invariants = conserved::invariants(self.program.plan);
-        let reacted = conserved::defects(&invariants, &self.reactions.added, &self.initial_sizes());
-        defects.iter_mut().zip(reacted).for_each(|(own, other)| *own = amount::worse(*own, other));
-        Ok(defects)
+        Ok(self.defects(&after))
     }
 }
 

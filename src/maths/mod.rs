@@ -7,6 +7,7 @@ pub mod chacha;
 pub mod double;
 pub mod exact;
 pub mod fourier;
+pub mod interval;
 pub mod normal;
 pub mod operator;
 pub mod order;

@@ -128,6 +128,30 @@ pub struct Mineral {
     pub coefficients: Vec<(usize, f64)>,
 }
 
+impl Equilibrium {
+    /// Everything in equilibrium.
+    pub fn members(&self) -> Vec<usize> {
+        let primaries = self.primaries.iter().map(|primary| primary.species);
+        let secondaries = self.secondaries.iter().map(|secondary| secondary.species);
+        primaries.chain(secondaries).chain(self.minerals.iter().map(|mineral| mineral.species)).collect()
+    }
+
+    /// What the total of a primary species adds up, each with how often: itself and what is made of it.
+    pub fn total(&self, primary: usize) -> Vec<(usize, f64)> {
+        let share = |coefficients: &[(usize, f64)], species: usize| {
+            coefficients.iter().find(|(own, _)| *own == primary).map(|(_, nu)| (species, *nu))
+        };
+        let secondaries = self.secondaries.iter().filter_map(|it| share(&it.coefficients, it.species));
+        let minerals = self.minerals.iter().filter_map(|it| share(&it.coefficients, it.species));
+        [(self.primaries[primary].species, 1.0)].into_iter().chain(secondaries).chain(minerals).collect()
+    }
+
+    /// Whether a total is a sum of amounts.
+    pub fn is_sum(&self, primary: usize) -> bool {
+        self.total(primary).iter().all(|(_, nu)| *nu > 0.0)
+    }
+}
+
 impl super::Plan {
     /// Whether particles react in each step.
     pub fn reacts_in_steps(&self) -> bool {

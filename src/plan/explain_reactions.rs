@@ -2,7 +2,9 @@
 //!
 //! Owns these lines of `lamella plan`. May use the plan. It deliberately decides nothing.
 
-use super::chemistry::{Activity, Chemistry, Equilibrium, Kinetic, Kinetics, Law, Method, Splitting};
+use super::chemistry::{
+    Activity, Chemistry, Equilibrium, Integrator, Kinetic, Kinetics, Law, Method, Splitting,
+};
 use super::{Component, Plan, Species};
 use crate::diagnostic::number;
 
@@ -14,6 +16,7 @@ pub(super) fn lines(plan: &Plan) -> Vec<String> {
         lines.extend(kinetics.reactions.iter().map(|reaction| reaction_line(plan, kinetics, reaction)));
         lines.push(method_line(kinetics.method).to_owned());
         if has_error_control(kinetics.method) {
+            lines.extend(gate_lines(plan, chemistry, kinetics));
             lines.push(format!(
                 "tolerance {} relative, {}",
                 number(chemistry.tolerance),
@@ -26,6 +29,24 @@ pub(super) fn lines(plan: &Plan) -> Vec<String> {
     }
     if let Some(equilibrium) = &chemistry.equilibrium {
         lines.extend(equilibrium_lines(plan, equilibrium));
+    }
+    lines
+}
+
+/// Rates that have to be told the end of what they take.
+fn gate_lines(plan: &Plan, chemistry: &Chemistry, kinetics: &Kinetics) -> Vec<String> {
+    let mut lines = Vec::new();
+    for (reaction, gates) in kinetics.reactions.iter().zip(plan.gates()).filter(|(_, it)| !it.is_empty()) {
+        let mut names: Vec<&str> = gates.components().map(|idx| &*plan.components[idx].name).collect();
+        names.dedup();
+        let (names, one) = (names.join(", "), if names.len() == 1 { "it" } else { "them" });
+        lines.push(format!(
+            "the rate of `{}` does not see how much is left of {names}: it ends with {one}",
+            reaction.name
+        ));
+    }
+    if !lines.is_empty() && chemistry.integrator == Integrator::Explicit {
+        lines.push("`integrator explicit` is not taken: such an end is stiff".to_owned());
     }
     lines
 }

@@ -15,6 +15,7 @@ pub mod eliminate;
 pub mod evaluation;
 pub mod explain;
 mod explain_reactions;
+pub mod gates;
 mod integrator;
 mod law;
 pub mod limits;

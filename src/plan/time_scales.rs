@@ -20,8 +20,11 @@ const FIRST_STEP: f64 = 1e-3;
 /// The time scales of a plan's kinetics.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TimeScales {
-    /// Per reaction the largest |∇r · ν| met, 1/s: how fast it would relax by itself.
+    /// Per reaction the largest |∇r · ν| met, 1/s: how fast it would relax by itself. Below the floors nothing
+    /// is looked at: how a rate without order ends there is no time of the reaction.
     pub rates: Vec<f64>,
+    /// The largest of all, such ends included, 1/s: what an integrator meets.
+    pub steepest: f64,
     /// The reaction with the largest.
     pub fastest: usize,
     /// The smallest above zero, 1/s.
@@ -50,12 +53,13 @@ impl TimeScales {
         let network = Network { plan, kinetics };
         let states = network.states();
         let mut rates = vec![0.0_f64; kinetics.reactions.len()];
+        let mut steepest = 0.0_f64;
         for (position, state) in &states {
-            network.course(*position, state.clone(), &mut rates);
+            network.course(*position, state.clone(), (&mut rates, &mut steepest));
         }
         let fastest = (0..rates.len()).max_by(|&a, &b| rates[a].total_cmp(&rates[b]))?;
         let slowest_rate = rates.iter().copied().filter(|rate| *rate > 0.0).fold(f64::INFINITY, f64::min);
-        (rates[fastest] > 0.0).then_some(Self { rates, fastest, slowest_rate })
+        (rates[fastest] > 0.0).then_some(Self { rates, steepest, fastest, slowest_rate })
     }
 }
 
@@ -102,6 +106,13 @@ impl Network<'_> {
         self.plan.species.iter().map(of).collect()
     }
 
+    /// The same state with no component below its floor.
+    fn raised(&self, components: &[f64]) -> Vec<f64> {
+        let floors = self.plan.chemistry.as_ref().map_or(&[][..], |chemistry| &chemistry.floors);
+        let floor = |k: usize| 1.001 * floors.get(k).copied().unwrap_or(0.0);
+        components.iter().enumerate().map(|(k, value)| value.max(floor(k))).collect()
+    }
+
     /// Rates, and their derivatives by components.
     fn rates(&self, position: [f64; 3], t: f64, components: &[f64]) -> (Vec<f64>, Vec<Slopes>) {
         let [x, y, z] = position;
@@ -124,24 +135,29 @@ impl Network<'_> {
 
     /// Follows a state to the end of the run with linearly implicit Euler steps of growing length, and
     /// keeps the largest |∇r · ν| of each reaction.
-    fn course(&self, position: [f64; 3], mut y: Vec<f64>, largest: &mut [f64]) {
+    fn course(&self, position: [f64; 3], mut y: Vec<f64>, (largest, steepest): (&mut [f64], &mut f64)) {
         let duration = self.plan.time.duration;
         let (mut t, mut step) = (0.0, None);
         let n = y.len();
         while t < duration {
             let (rates, slopes) = self.rates(position, t, &y);
+            let raised = self.raised(&y);
+            let above = (raised != y).then(|| self.rates(position, t, &raised).1);
             let mut fastest = 0.0_f64;
             let mut f = vec![0.0; n];
             let mut j = vec![0.0; n * n];
             for (k, reaction) in self.kinetics.reactions.iter().enumerate() {
-                let slope_by = |i: usize| {
-                    slopes[k].binary_search_by_key(&i, |(other, _)| *other).map_or(0.0, |at| slopes[k][at].1)
+                let speed = |slopes: &Slopes| -> f64 {
+                    let slope_by = |i: usize| {
+                        slopes.binary_search_by_key(&i, |(other, _)| *other).map_or(0.0, |at| slopes[at].1)
+                    };
+                    let own: f64 = reaction.changes.iter().map(|&(i, nu)| nu * slope_by(i)).sum();
+                    if own.is_finite() { own.abs() } else { 0.0 }
                 };
-                let own: f64 = reaction.changes.iter().map(|&(i, nu)| nu * slope_by(i)).sum();
-                if own.is_finite() {
-                    largest[k] = largest[k].max(own.abs());
-                    fastest = fastest.max(own.abs());
-                }
+                let own = speed(&slopes[k]);
+                largest[k] = largest[k].max(above.as_ref().map_or(own, |above| speed(&above[k])));
+                *steepest = steepest.max(own);
+                fastest = fastest.max(own);
                 for &(i, nu) in &reaction.changes {
                     f[i] += nu * rates[k];
                     slopes[k].iter().for_each(|&(column, slope)| j[i * n + column] += nu * slope);

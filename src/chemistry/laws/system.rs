@@ -9,17 +9,18 @@ use super::derive::{Derivative, safe_power};
 use super::graph::{Graph, Id};
 use crate::maths::operator::{Binary, Unary};
 use crate::plan::Species;
-use crate::plan::chemistry::Kinetics;
+use crate::plan::chemistry::{Equilibrium, Kinetics};
+use crate::plan::gates::{self, Gates};
 use crate::plan::tape::Operation;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::BTreeMap;
 
 /// What the variables of the programs are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Basis {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Basis<'a> {
     /// Components; species are put in by their recipes.
     Components,
     /// Species, as speciation gives them; results are still those of components.
-    Species,
+    Species(&'a Equilibrium),
 }
 
 /// Programs of a network. Inputs are the variables, then x, y, z, t.
@@ -35,7 +36,7 @@ pub struct System {
     /// `(component, variable)` of each entry that may be other than zero, row by row.
     pub pattern: Vec<(usize, usize)>,
     pub reads_time: bool,
-    /// Components that are a species of their own, and therefore never below zero.
+    /// Components that are amounts, and therefore never below zero.
     pub is_positive: Vec<bool>,
     /// Whether some rate had to be told when its reactant is exhausted.
     pub is_gated: bool,
@@ -56,7 +57,7 @@ impl System {
         kinetics: &Kinetics,
         species: &[Species],
         n_components: usize,
-        basis: Basis,
+        basis: Basis<'_>,
         small: &[f64],
     ) -> Result<Self, String> {
         let mut builder = Builder::new(kinetics, species, n_components, basis, small);
@@ -104,8 +105,9 @@ struct Builder<'a> {
     small: &'a [f64],
     n_components: usize,
     n_variables: usize,
-    basis: Basis,
+    basis: Basis<'a>,
     is_positive: Vec<bool>,
+    equilibrium: Option<&'a Equilibrium>,
     graph: Graph,
     n_gates: usize,
 }
@@ -115,18 +117,15 @@ impl<'a> Builder<'a> {
         kinetics: &'a Kinetics,
         species: &'a [Species],
         n_components: usize,
-        basis: Basis,
+        basis: Basis<'a>,
         small: &'a [f64],
     ) -> Self {
         let n_variables = if basis == Basis::Components { n_components } else { species.len() };
-        let mut is_positive = vec![false; n_components];
-        if basis == Basis::Components {
-            for species in species {
-                if let (&[(component, coefficient)], 0.0) = (&species.terms[..], species.constant) {
-                    is_positive[component] |= coefficient > 0.0;
-                }
-            }
-        }
+        let equilibrium = match basis {
+            Basis::Components => None,
+            Basis::Species(equilibrium) => Some(equilibrium),
+        };
+        let is_positive = gates::amounts(species, equilibrium, n_components);
         Self {
             kinetics,
             species,
@@ -135,6 +134,7 @@ impl<'a> Builder<'a> {
             n_variables,
             basis,
             is_positive,
+            equilibrium,
             graph: Graph::default(),
             n_gates: 0,
         }
@@ -142,7 +142,7 @@ impl<'a> Builder<'a> {
 
     /// The concentration of a species, never below zero.
     fn concentration(&mut self, species: usize) -> Id {
-        if self.basis == Basis::Species {
+        if self.basis != Basis::Components {
             return self.graph.input(species as u16);
         }
         let recipe = &self.species[species];
@@ -186,7 +186,8 @@ impl<'a> Builder<'a> {
         }
         let rates: Vec<Id> =
             self.kinetics.laws.rates.iter().map(|&register| ids[usize::from(register)]).collect();
-        Ok((0..rates.len()).map(|reaction| self.gated(reaction, rates[reaction])).collect())
+        let gates = gates::of(self.kinetics, self.species, self.equilibrium, self.n_components);
+        Ok(rates.into_iter().zip(&gates).map(|(rate, gates)| self.gated(gates, rate)).collect())
     }
 
     fn reads_variables(&self, id: Id) -> bool {
@@ -257,24 +258,14 @@ impl<'a> Builder<'a> {
 
     /// The rate, faded out below `small` of each component that it would otherwise consume although
     /// nothing is left of it: forward ones by the reactants, backward ones by the products.
-    fn gated(&mut self, reaction: usize, rate: Id) -> Id {
-        let changes = &self.kinetics.reactions[reaction].changes;
-        let (mut forward, mut backward) = (Vec::new(), Vec::new());
-        for &(component, coefficient) in changes {
-            if self.basis == Basis::Components
-                && self.is_positive[component]
-                && self.consumes_nothing(rate, component, coefficient)
-            {
-                if coefficient < 0.0 { forward.push(component) } else { backward.push(component) }
-            }
-        }
-        if forward.is_empty() && backward.is_empty() {
+    fn gated(&mut self, gates: &Gates, rate: Id) -> Id {
+        if gates.is_empty() {
             return rate;
         }
-        self.n_gates += forward.len() + backward.len();
+        self.n_gates += gates.forward.len() + gates.backward.len();
         let zero = self.graph.constant(0.0);
         let is_forward = self.graph.binary(Binary::GreaterEqual, rate, zero);
-        let (forward, backward) = (self.gate(&forward), self.gate(&backward));
+        let (forward, backward) = (self.gate(&gates.forward), self.gate(&gates.backward));
         let gate = self.graph.select(is_forward, forward, backward);
         self.graph.multiply(gate, rate)
     }
@@ -283,7 +274,7 @@ impl<'a> Builder<'a> {
         let one = self.graph.constant(1.0);
         let mut product = one;
         for &component in components {
-            let input = self.graph.input(component as u16);
+            let input = self.amount(component);
             let scale = self.graph.constant(1.0 / self.small[component].max(1e-300));
             let share = self.graph.multiply(scale, input);
             let gate = self.graph.binary(Binary::Minimum, share, one);
@@ -292,43 +283,18 @@ impl<'a> Builder<'a> {
         product
     }
 
-    /// Whether the reaction takes of a component of which there is none: asked symbolically, then at
-    /// points over 12 decades.
-    fn consumes_nothing(&mut self, rate: Id, component: usize, coefficient: f64) -> bool {
-        let emptied = self.emptied(rate, component as u16);
-        if let Some(value) = self.graph.value(emptied) {
-            return value * coefficient < 0.0;
+    /// What there is of a component that is an amount: its input, or the sum of its species.
+    fn amount(&mut self, component: usize) -> Id {
+        if self.basis == Basis::Components {
+            return self.graph.input(component as u16);
         }
-        let mut state = 0x9e37_79b9_7f4a_7c15_u64;
-        let mut fraction = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 11) as f64 / 9_007_199_254_740_992.0
-        };
-        (0..64).any(|_| {
-            let inputs: Vec<f64> = (0..self.n_variables + 4)
-                .map(|_| crate::maths::scalar::exp(27.6 * fraction() - 18.4))
-                .collect();
-            // Only what this rate reads: the graph holds more.
-            self.graph.values(&inputs)[emptied as usize] * coefficient < 0.0
-        })
-    }
-
-    /// The expression without a component.
-    fn emptied(&mut self, root: Id, input: u16) -> Id {
-        use super::graph::Node;
-        let is_reached = self.graph.reached(&[root]);
-        let mut replaced: HashMap<Id, Id> = HashMap::new();
-        for id in (0..=root).filter(|&id| is_reached[id as usize]) {
-            let new = match self.graph.node(id) {
-                Node::Input(other) if other == input => self.graph.constant(0.0),
-                Node::Constant(_) | Node::Input(_) => id,
-                Node::Unary(unary, a) => self.graph.unary(unary, replaced[&a]),
-                Node::Binary(binary, a, b) => self.graph.binary(binary, replaced[&a], replaced[&b]),
-                Node::Select(a, b, c) => self.graph.select(replaced[&a], replaced[&b], replaced[&c]),
-            };
-            replaced.insert(id, new);
+        let mut sum = self.graph.constant(0.0);
+        for (species, share) in gates::parts(self.species, self.equilibrium, component) {
+            let (input, factor) = (self.graph.input(species as u16), self.graph.constant(share));
+            let term = self.graph.multiply(factor, input);
+            sum = self.graph.add(sum, term);
         }
-        replaced[&root]
+        sum
     }
 
     fn linear(&self, dydt: &[Id], entries: &BTreeMap<(usize, usize), Id>) -> Option<Linear> {

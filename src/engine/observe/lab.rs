@@ -262,7 +262,7 @@ pub fn resolve<const D: usize>(
         }
     }
     if needs.any()
-        && let Some(reversal) = &run.reactions.reversal
+        && let Some(reversal) = &run.reactions.shown
     {
         reversal.apply(&mut lab.components, n);
     }

@@ -1,8 +1,8 @@
 //! Reactions whose course no output reads, and the species that only they concern.
 //!
 //! Liveness runs backwards: a species that is read needs its components; a component needs every reaction
-//! that changes it; a reaction needs the species that its rate names and those that it uses up. What is in
-//! equilibrium is needed as a whole or not at all.
+//! that changes it; a reaction needs the species that its rate names, and those that it would take although
+//! there are none. What is in equilibrium is needed as a whole or not at all.
 
 use super::{Draft, species};
 use crate::plan::build_tape::SPECIES_INPUT;
@@ -38,6 +38,10 @@ pub(super) fn run(draft: &mut Draft) {
     }
     let Some(chemistry) = &mut draft.plan.chemistry else { return };
     let is_empty = keep_reactions(chemistry, &needs.reactions);
+    let is_idle = |equilibrium: &Equilibrium| !equilibrium.members().iter().any(|idx| needs.species[*idx]);
+    if chemistry.equilibrium.as_ref().is_some_and(is_idle) {
+        chemistry.equilibrium = None;
+    }
     if is_empty && chemistry.equilibrium.is_none() {
         draft.plan.chemistry = None;
     }
@@ -109,9 +113,10 @@ fn needs(plan: &Plan, kinetics: &Kinetics) -> Needs {
         }
     }
     let together = plan.chemistry.as_ref().and_then(|chemistry| chemistry.equilibrium.as_ref());
-    let together = together.map(members).unwrap_or_default();
+    let together = together.map(Equilibrium::members).unwrap_or_default();
     let laws: Vec<Vec<usize>> = (0..kinetics.reactions.len()).map(|idx| named(kinetics, idx)).collect();
     let carriers = carriers(plan, kinetics);
+    let gates = plan.gates();
     loop {
         let before = needs.species.clone();
         for reaction in &plan.reactions {
@@ -129,12 +134,11 @@ fn needs(plan: &Plan, kinetics: &Kinetics) -> Needs {
             if needs.reactions[idx] {
                 laws[idx].iter().for_each(|species| needs.species[*species] = true);
                 // A closed form ends where the scarcest of what it uses up does.
-                let spent = reaction.changes.iter().filter(|(_, change)| *change < 0.0);
                 let is_closed = matches!(kinetics.method, Method::Pair | Method::Saturation | Method::Zero);
-                spent
-                    .filter(|_| is_closed)
-                    .flat_map(|(item, _)| &carriers[*item])
-                    .for_each(|species| needs.species[*species] = true);
+                let spent = reaction.changes.iter().filter(|(_, change)| is_closed && *change < 0.0);
+                // And a rate that does not know its end, where that of its gates is.
+                let ends = spent.map(|(item, _)| *item).chain(gates[idx].components());
+                ends.flat_map(|item| &carriers[item]).for_each(|species| needs.species[*species] = true);
             }
         }
         if before == needs.species {
@@ -175,12 +179,6 @@ fn named(kinetics: &Kinetics, reaction: usize) -> Vec<usize> {
     list
 }
 
-fn members(equilibrium: &Equilibrium) -> Vec<usize> {
-    let primaries = equilibrium.primaries.iter().map(|primary| primary.species);
-    let secondaries = equilibrium.secondaries.iter().map(|secondary| secondary.species);
-    primaries.chain(secondaries).chain(equilibrium.minerals.iter().map(|mineral| mineral.species)).collect()
-}
-
 /// Which species react at rates or are in equilibrium, or are named in a rate.
 pub(super) fn species_of_chemistry(plan: &Plan) -> Vec<bool> {
     let mut list = vec![false; plan.species.len()];
@@ -193,7 +191,7 @@ pub(super) fn species_of_chemistry(plan: &Plan) -> Vec<bool> {
         }
     }
     if let Some(equilibrium) = &chemistry.equilibrium {
-        members(equilibrium).into_iter().for_each(|species| list[species] = true);
+        equilibrium.members().into_iter().for_each(|species| list[species] = true);
     }
     list
 }
