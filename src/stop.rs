@@ -149,9 +149,9 @@ impl Place<'_> {
                     .help(format!("use a larger `chemistry tolerance`, or a `floor` below which `{name}` is none"))
                     .help(format!("if `{name}` grows without bound, the run has to end before {} s", precise(t)))
             }
-            Why::NotFinite { component } => self
+            Why::NotFinite { component, .. } => self
                 .at_rates(message, component, "no finite number at what the run has come to")
-                .help("look for a division by what may be zero, for a negative order, and for numbers far from the others"),
+                .help("look for a division by what may be zero, for a root or a logarithm of what may be negative, for a negative order, and for numbers far from the others"),
             Why::Negative { component, .. } => self
                 .at_rates(message, component, "takes more than there is")
                 .help("use a smaller `chemistry tolerance`"),

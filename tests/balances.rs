@@ -302,6 +302,45 @@ fn what_desorbs_where_nobody_is_stays() {
     assert!(finished.mass_defect < 1e-12);
 }
 
+/// `sqrt(A − 2)` of half a mole per litre is no number, and neither is the logarithm; at the end of its domain
+/// a law ends.
+#[test]
+fn laws_outside_of_their_domain_stop_the_run() {
+    let stopped = |law: &str| {
+        let text = format!(
+            "{BATCH}species A, B\nreaction r: A -> B @ {law}\nreaction q: B -> A @ 0.1 /d\ninitial A = 0.5 mol/L, B = 1 mol/L\n\
+             run to 10 d, step 1 d\noutput profile A, B at t = 1 d on 1\n"
+        );
+        let plan = compile(&text, Selection::All).plan;
+        lamella::engine::run(&plan, &EngineSettings::default(), &Unattended, &mut |_| Ok(()))
+    };
+    for law in [
+        "1 mol/L/d * sqrt(A/(1 mol/L) - 2)",
+        "1 mol/L/d * (A/(1 mol/L) - 2)^1.5",
+        "-0.1 mol/L/d * ln(A/(1 mol/L) - 2)",
+    ] {
+        let error = stopped(law).expect_err(law).to_string();
+        assert!(
+            error.contains("particle 0") && error.contains("in reaction `r` is not a finite number"),
+            "{error}"
+        );
+    }
+    for law in [
+        "1 mol/L/d * sqrt(max(0, A/(1 mol/L) - 2))",
+        "1 mol/L/d * (if A > 2 mol/L then sqrt(A/(1 mol/L) - 2) else 0)",
+    ] {
+        assert!(stopped(law).is_ok(), "{law}");
+    }
+    // From 0.5 down to 0.2: c = 0.2 + (sqrt(0.3) − t/2)² in mol/L and d, which ends at 1.095 d.
+    let finished = run(&format!(
+        "{BATCH}species A, B\nreaction r: A -> B @ 1 mol/L/d * sqrt(A/(1 mol/L) - 0.2)\ninitial A = 0.5 mol/L\n\
+         run to 10 d, step 1 d\noutput profile A, B at t = 1 d, 10 d on 1\n"
+    ));
+    let right = 1e3 * (0.2 + (0.3_f64.sqrt() - 0.5).powi(2));
+    let a = finished.values("A");
+    assert!((a[0] - right).abs() < 1e-5 * right && (a[1] - 200.0).abs() < 1e-3, "{a:?} {right}");
+}
+
 /// What the plan says is what runs: a rate with a gate is stiff at its end.
 #[test]
 fn gated_rates_are_planned_as_stiff() {

@@ -133,7 +133,7 @@ fn species_follow_from_totals_and_what_has_none_is_refused() {
     }
     let failure =
         reactor.speciate(&[&[1.0, f64::NAN]], &mut [&mut a[..2], &mut a2[..2]], &mut Scratch::default());
-    assert_eq!(failure, Err(Failure { particle: 1, why: Why::NotFinite { component: 0 } }));
+    assert_eq!(failure, Err(Failure { particle: 1, why: Why::NotFinite { component: 0, reaction: None } }));
 }
 
 /// H⁺, CO₃²⁻, Ca²⁺ with OH⁻, HCO₃⁻, CO₂, CaCO₃(aq) and calcite; CO₂ leaves to the air.

@@ -54,6 +54,7 @@ fn faults(verdict: &Verdict, tolerance: f64) -> Vec<String> {
             require(verdict.mass_defect.is_some_and(|defect| defect < 1e-9), "mass is lost");
             require(verdict.error.is_none_or(|error| error < 100.0 * tolerance), "far from a tighter run");
         }
+        Fate::MassLost | Fate::Negative => require(false, "wrong numbers"),
         Fate::TooLong => require(verdict.reason.is_some(), "no reason"),
     }
     found

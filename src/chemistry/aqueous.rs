@@ -220,7 +220,7 @@ fn add_up(constant: f64, terms: &[(usize, f64)], components: &[&[f64]], column: 
 
 fn why(refusal: Refusal) -> Why {
     match refusal {
-        Refusal::NotFinite { primary } => Why::NotFinite { component: primary },
+        Refusal::NotFinite { primary } => Why::NotFinite { component: primary, reaction: None },
         Refusal::Infeasible => Why::Impossible,
         Refusal::Endless => Why::Endless,
         Refusal::IonicStrength { value } => Why::TooSalty { ionic_strength: value },

@@ -350,7 +350,7 @@ fn lose(network: &Network, lanes: &mut Lanes, task: &mut Task<'_, '_>, l: usize,
     let t = task.t + lanes.elapsed[l];
     let broken = lanes.slopes.iter().position(|slope| !slope[l].is_finite());
     let why = match broken {
-        Some(component) => Why::NotFinite { component },
+        Some(component) => Why::NotFinite { component, reaction: broken_rate(network, lanes, l) },
         None if lanes.count[l] >= most => {
             Why::TooManySteps { t, tried: lanes.count[l], share: lanes.elapsed[l] / task.dt }
         }
@@ -358,6 +358,17 @@ fn lose(network: &Network, lanes: &mut Lanes, task: &mut Task<'_, '_>, l: usize,
     };
     task.failures.push(Failure { particle, why });
     lanes.particle[l] = IDLE;
+}
+
+/// The first reaction whose rate is no number where the sub-step began.
+#[cold]
+fn broken_rate(network: &Network, lanes: &Lanes, l: usize) -> Option<usize> {
+    let System { each, n_variables, .. } = &network.system;
+    let mut registers = each.registers();
+    let n_inputs = n_variables + 4;
+    registers[..n_inputs].copy_from_slice(&lanes.full[..n_inputs]);
+    each.run(&mut registers);
+    each.outputs.iter().position(|&place| !registers[usize::from(place)][l].is_finite())
 }
 
 /// The component with the largest error; one whose value is no number before all others.

@@ -114,6 +114,8 @@ pub enum Why {
     },
     NotFinite {
         component: usize,
+        /// The first whose rate is no number, if it is known.
+        reaction: Option<usize>,
     },
     Negative {
         component: usize,
@@ -131,6 +133,16 @@ pub enum Why {
     TooSalty {
         ionic_strength: f64,
     },
+}
+
+impl Why {
+    /// For a reactor of some of a plan's reactions, whose numbers are others.
+    pub fn without_reaction(self) -> Self {
+        match self {
+            Self::NotFinite { component, .. } => Self::NotFinite { component, reaction: None },
+            other => other,
+        }
+    }
 }
 
 /// What a first-order network does in a time: `y ← matrix · y + constant`.
@@ -382,7 +394,7 @@ fn check_finite(components: &[&mut [f64]]) -> Result<(), Failure> {
         let sum: f64 = column.iter().map(|value| value * 0.0).sum();
         if sum != 0.0 {
             let particle = column.iter().position(|value| !value.is_finite()).unwrap_or(0);
-            return Err(Failure { particle, why: Why::NotFinite { component } });
+            return Err(Failure { particle, why: Why::NotFinite { component, reaction: None } });
         }
     }
     Ok(())

@@ -393,7 +393,7 @@ mod tests {
         let why = lamella::chemistry::Why::TooManySteps { t: 0.1, tried: 7, share: 0.1 };
         let slow = RunError::Chemistry { step: 1, particle: 0, what: "slow".to_owned(), why };
         assert_eq!(of(slow), ("R106", Exit::Failed, Some(7)));
-        let why = lamella::chemistry::Why::NotFinite { component: 0 };
+        let why = lamella::chemistry::Why::NotFinite { component: 0, reaction: None };
         let wild = RunError::Chemistry { step: 1, particle: 0, what: "wild".to_owned(), why };
         assert_eq!(of(wild), ("R107", Exit::Failed, Some(2)));
         let stopped = measuring_failed("The measure `m` has no value.".to_owned());

@@ -181,15 +181,23 @@ fn text(rows: &[StressRow], wall: f64, terminal: &Terminal) -> Result<String, St
     };
     let lines: Vec<Vec<String>> = rows.iter().map(line).collect();
     let count = |fate: Fate| rows.iter().filter(|row| row.fate == fate.name()).count();
+    // Never, and so not worth a word where there are none.
+    let wrong: String = [(Fate::MassLost, "lost mass"), (Fate::Negative, "below zero")]
+        .into_iter()
+        .map(|(fate, word)| (count(fate), word))
+        .filter(|(n, _)| *n > 0)
+        .map(|(n, word)| format!(", {n} {word}"))
+        .collect();
     Ok(table(&header, &lines)
         + &format!(
-            "\n{} trials in {}: {} finished, {} refused, {} stopped, {} too long\n",
+            "\n{} trials in {}: {} finished, {} refused, {} stopped, {} too long{}\n",
             rows.len(),
             duration(wall),
             count(Fate::Finished),
             count(Fate::Refused),
             count(Fate::Stopped),
-            count(Fate::TooLong)
+            count(Fate::TooLong),
+            wrong
         ))
 }
 

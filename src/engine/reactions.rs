@@ -240,8 +240,12 @@ impl Reactions {
             Why::TooManySteps { t, tried, .. } => {
                 format!("{tried} sub-steps, the most that one step may take, end at {} s", precise(t))
             }
-            Why::NotFinite { component } => {
-                format!("the rate of `{}` is not a finite number", name(component))
+            Why::NotFinite { component, reaction } => {
+                let kinetics =
+                    program.plan.chemistry.as_ref().and_then(|chemistry| chemistry.kinetics.as_ref());
+                let own = reaction.and_then(|idx| kinetics?.reactions.get(idx));
+                let own = own.map_or_else(String::new, |own| format!(" in reaction `{}`", own.name));
+                format!("the rate of `{}`{own} is not a finite number", name(component))
             }
             Why::Negative { component, value } => {
                 format!("`{}` would become negative ({})", name(component), precise(value))
@@ -355,8 +359,12 @@ impl<const D: usize> Run<'_, D> {
                 memory: &mut memory[range.clone()],
             };
             if let Err(failure) = reactor.react(batch, &mut scratch) {
-                let what = format!("in a bin without particles: {}", reactions.explain(program, failure.why));
-                let why = failure.why;
+                let what = format!(
+                    "in a bin without particles: {}",
+                    reactions.explain(program, failure.why.without_reaction())
+                );
+                // Fewer reactions go on there: numbers are not those of the plan.
+                let why = failure.why.without_reaction();
                 return Err(RunError::Chemistry { step: step.max(1), particle: 0, what, why });
             }
         }

@@ -18,6 +18,9 @@ const TIGHTER: f64 = 1e-2;
 /// Tighter tolerances are not asked for.
 const TIGHTEST: f64 = 1e-13;
 
+/// Without a tolerance: what is below zero by this share of the largest value is no rounding.
+const LEAST: f64 = 1e-9;
+
 /// How much a trial may take.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
@@ -42,6 +45,10 @@ pub enum Fate {
     Refused,
     /// The run stopped with a reason.
     Stopped,
+    /// What is conserved was not.
+    MassLost,
+    /// Something was below zero by more than the tolerance.
+    Negative,
     /// Not run, or cut short, for its time.
     TooLong,
 }
@@ -52,6 +59,8 @@ impl Fate {
             Self::Finished => "finished",
             Self::Refused => "refused",
             Self::Stopped => "stopped",
+            Self::MassLost => "mass_lost",
+            Self::Negative => "negative",
             Self::TooLong => "too_long",
         }
     }
@@ -162,7 +171,11 @@ impl Verdict {
                 return;
             }
             Err(error) => {
-                self.fate = Fate::Stopped;
+                self.fate = match error {
+                    RunError::MassLost { .. } => Fate::MassLost,
+                    RunError::NegativeConcentration { .. } => Fate::Negative,
+                    _ => Fate::Stopped,
+                };
                 self.message = Some(stop::message(&error, scenario, &compiled.plan));
                 return;
             }
@@ -172,6 +185,11 @@ impl Verdict {
         self.mass_defect = Some(outcome.worst_defect());
         let (lowest, highest) = extremes(&snapshots);
         self.lowest = (highest > 0.0).then_some(lowest / highest);
+        let tolerance = compiled.plan.chemistry.as_ref().map_or(LEAST, |chemistry| chemistry.tolerance);
+        if self.lowest.is_some_and(|lowest| lowest < -tolerance) {
+            self.fate = Fate::Negative;
+            self.reason = Some("a concentration that is shown is below zero".to_owned());
+        }
         self.error = tolerance_error(&compiled.plan, &snapshots, bounds.time);
     }
 }

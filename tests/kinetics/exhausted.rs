@@ -147,7 +147,7 @@ fn what_cannot_be_integrated_is_refused() {
             let failure = step(&network.reactor(method, 1e-6, 1e-9), &[1.0], 0.0, 2.0).unwrap_err();
             let is_as_said = match failure.why {
                 Why::StepTooSmall { .. } => true,
-                Why::NotFinite { component } => !is_number || component == 0,
+                Why::NotFinite { component, .. } => !is_number || component == 0,
                 _ => false,
             };
             assert!(is_as_said, "{failure:?}");

@@ -3,6 +3,7 @@
 //! Owns the nodes, their sharing, folding and simplification. May use `maths`. It deliberately assumes
 //! that numbers are finite where it drops a product with zero; what is not finite shows in the rates.
 
+use crate::maths::interval::Interval;
 use crate::maths::operator::{Binary, Unary};
 use crate::maths::vector;
 use std::collections::HashMap;
@@ -249,6 +250,26 @@ impl Graph {
             Node::Select(a, b, c) => ([a, b, c], 3),
         };
         operands.into_iter().take(n)
+    }
+
+    /// Between which numbers an expression stays, from the bounds of its inputs.
+    pub fn bounds(&self, root: Id, of_input: &dyn Fn(u16) -> Interval) -> Interval {
+        let is_reached = self.reached(&[root]);
+        let mut list = vec![Interval::ANY; root as usize + 1];
+        for id in (0..=root).filter(|&id| is_reached[id as usize]) {
+            let read = |id: Id| list[id as usize];
+            list[id as usize] = match self.node(id) {
+                Node::Constant(bits) => Interval::of(f64::from_bits(bits)),
+                Node::Input(input) => of_input(input),
+                Node::Unary(unary, a) => Interval::unary(unary, read(a)),
+                Node::Binary(binary, a, b) if a == b && binary == Binary::Multiply => {
+                    Interval::binary(Binary::Power, read(a), Interval::of(2.0))
+                }
+                Node::Binary(binary, a, b) => Interval::binary(binary, read(a), read(b)),
+                Node::Select(a, b, c) => Interval::select(read(a), read(b), read(c)),
+            };
+        }
+        list[root as usize]
     }
 
     /// All values for given inputs, one after the other: for tests and for questions at compile time.

@@ -7,12 +7,16 @@
 use super::code::Code;
 use super::derive::{Derivative, safe_power};
 use super::graph::{Graph, Id};
+use crate::maths::interval::Interval;
 use crate::maths::operator::{Binary, Unary};
 use crate::plan::Species;
 use crate::plan::chemistry::{Equilibrium, Kinetics};
 use crate::plan::gates::{self, Gates};
 use crate::plan::tape::Operation;
 use std::collections::BTreeMap;
+
+/// Arguments of roots may be below zero by what an error of this share of each concentration makes of them.
+const ROUNDING: f64 = 1e-6;
 
 /// What the variables of the programs are.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,6 +34,8 @@ pub struct System {
     pub n_components: usize,
     /// Results: `dy/dt` of every component.
     pub rates: Code,
+    /// Results: the rate of every reaction, to find the one that is no number.
+    pub each: Code,
     /// Results: `dy/dt`, then the Jacobian's entries in the order of `pattern`, then `∂/∂t dy/dt` unless
     /// nothing reads the time.
     pub full: Code,
@@ -89,6 +95,7 @@ impl System {
             n_variables: builder.n_variables,
             n_components,
             rates: Code::new(&builder.graph, n_inputs, &dydt)?,
+            each: Code::new(&builder.graph, n_inputs, &rates)?,
             full: Code::new(&builder.graph, n_inputs, &roots)?,
             pattern,
             reads_time,
@@ -225,7 +232,8 @@ impl<'a> Builder<'a> {
                 let epsilon = self.epsilon(a);
                 let floor = self.graph.constant(epsilon);
                 let raised = self.graph.binary(Binary::Maximum, a, floor);
-                self.graph.unary(unary, raised)
+                let value = self.graph.unary(unary, raised);
+                self.within_domain(a, value)
             }
             _ => self.graph.unary(unary, a),
         }
@@ -240,7 +248,47 @@ impl<'a> Builder<'a> {
             return self.graph.binary(Binary::Power, a, b);
         }
         let epsilon = self.epsilon(a);
-        safe_power(&mut self.graph, a, b, epsilon)
+        let value = safe_power(&mut self.graph, a, b, epsilon);
+        self.within_domain(a, value)
+    }
+
+    /// A root, a power or a logarithm is no number where its argument is below zero by more than rounding.
+    ///
+    /// - Equation: no number for `a < −Σ_k |∂a/∂c_k| (10⁻⁶ |c_k| + ε_k)`, else the value.
+    /// - Symbols: `c_k` the variables, `ε_k` the size below which none is left.
+    /// - Range: arguments that are provably not negative are left alone.
+    /// - Source: definition; what an error of 10⁻⁶ in every concentration makes of the argument.
+    /// - Shape: one more selection.
+    fn within_domain(&mut self, a: Id, value: Id) -> Id {
+        let (n, is_positive, basis) = (self.n_variables, &self.is_positive, self.basis);
+        let bounds = |input: u16| match usize::from(input) {
+            variable if variable < n && (basis != Basis::Components || is_positive[variable]) => {
+                Interval::AMOUNT
+            }
+            time if time == n + 3 => Interval::AMOUNT,
+            _ => Interval::ANY,
+        };
+        if self.graph.bounds(a, &bounds).low >= 0.0 {
+            return value;
+        }
+        let mut rounding = self.graph.constant(0.0);
+        for variable in 0..self.n_variables {
+            let slope = Derivative::new(variable as u16).of(&mut self.graph, a);
+            if self.graph.value(slope) == Some(0.0) {
+                continue;
+            }
+            let small = if self.basis == Basis::Components { self.small[variable] } else { 1e-18 };
+            let (input, share) = (self.graph.input(variable as u16), self.graph.constant(ROUNDING));
+            let (size, small) = (self.graph.unary(Unary::Abs, input), self.graph.constant(small));
+            let size = self.graph.multiply(share, size);
+            let (size, slope) = (self.graph.add(size, small), self.graph.unary(Unary::Abs, slope));
+            let term = self.graph.multiply(slope, size);
+            rounding = self.graph.add(rounding, term);
+        }
+        let lowest = self.graph.unary(Unary::Negate, rounding);
+        let is_inside = self.graph.binary(Binary::GreaterEqual, a, lowest);
+        let none = self.graph.constant(f64::NAN);
+        self.graph.select(is_inside, value, none)
     }
 
     /// `Σ_k coefficient · value_k` per component.
