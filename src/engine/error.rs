@@ -60,6 +60,13 @@ pub enum RunError {
         /// The species, or the pair.
         quantity: String,
     },
+    /// The flow could not be solved for.
+    Flow(String),
+    /// A particle would need more sub-steps than a step may have.
+    TooManySubSteps {
+        step: u64,
+        particle: u64,
+    },
     OutOfMemory {
         bytes: u64,
     },
@@ -120,6 +127,10 @@ impl fmt::Display for RunError {
             Self::NonFiniteOutput { t, kind, quantity } => {
                 let (kind, t) = (kind.word(), precise(*t));
                 write!(f, "`{kind} {quantity}` at {t} s is larger than numbers can hold (1.8e308 in SI)")
+            }
+            Self::Flow(what) => write!(f, "the flow: {what}"),
+            Self::TooManySubSteps { step, particle } => {
+                write!(f, "step {step}: particle {particle} would need more than 16,384 sub-steps")
             }
             Self::OutOfMemory { bytes } => write!(f, "no memory for {bytes} bytes of particles"),
             Self::Threads(what) => write!(f, "the threads could not be started: {what}"),

@@ -4,6 +4,7 @@
 //! plan. It deliberately moves nothing: the engine does.
 
 pub mod balance;
+pub mod build;
 pub mod cells;
 pub mod darcy;
 pub mod random_field;

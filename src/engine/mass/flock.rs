@@ -52,6 +52,13 @@ impl<const D: usize> Flock<D> {
         std::array::from_fn(|axis| self.positions[axis][idx])
     }
 
+    pub fn set(&mut self, idx: usize, id: u64, position: [f64; D]) {
+        self.ids[idx] = id;
+        for (axis, x) in self.positions.iter_mut().zip(position) {
+            axis[idx] = x;
+        }
+    }
+
     pub fn truncate(&mut self, len: usize) {
         self.ids.truncate(len);
         self.positions.iter_mut().for_each(|axis| axis.truncate(len));

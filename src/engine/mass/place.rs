@@ -73,13 +73,21 @@ impl<const D: usize> Cells<D> {
     }
 }
 
-/// Cells of nearly equal sides.
+/// Cells of nearly equal sides; the shortest axis first, so that a thin domain leaves its cells to the others.
 fn shape<const D: usize>(low: [f64; D], high: [f64; D]) -> [usize; D] {
     let length: [f64; D] = std::array::from_fn(|axis| high[axis] - low[axis]);
-    let longest = length.iter().fold(0.0, |a: f64, &b| a.max(b));
-    let shares: f64 = length.iter().map(|l| l / longest).product();
-    let most = crate::maths::scalar::pow(MOST_CELLS / shares.max(1e-9), 1.0 / D as f64);
-    length.map(|l| ((most * l / longest) as usize).clamp(1, 1 << 20))
+    let mut order: [usize; D] = std::array::from_fn(|axis| axis);
+    order.sort_by(|&a, &b| length[a].total_cmp(&length[b]));
+    let mut n = [1; D];
+    let mut left = MOST_CELLS;
+    for (rank, &axis) in order.iter().enumerate() {
+        let rest = &order[rank..];
+        let shape: f64 = rest.iter().map(|&other| length[axis] / length[other]).product();
+        let along = crate::maths::scalar::pow(left * shape, 1.0 / rest.len() as f64);
+        n[axis] = (along * (1.0 + 1e-12)).clamp(1.0, left) as usize;
+        left /= n[axis] as f64;
+    }
+    n
 }
 
 /// The first index whose cumulative sum is above a value, and the part of it that is below.

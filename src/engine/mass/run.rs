@@ -22,12 +22,14 @@ use super::observe::Scene;
 use super::release::{Birth, Kind, Release, Window};
 use super::world::Site;
 use crate::chemistry::Work;
+use crate::flow::build;
 use crate::maths::exact::Quanta;
 use crate::maths::wide::Width;
 use crate::plan::Plan;
 use crate::plan::tape::{Operation, Tape};
 use crate::plan::transport::{Dispersion, Flow};
 use crate::state::stream::{Purpose, Stream};
+use std::sync::Arc;
 
 /// Steps that a block is taken through before the next one.
 const TILE: u64 = 8;
@@ -41,7 +43,13 @@ pub fn run<const D: usize>(
     control: &dyn Control,
     sink: Sink,
 ) -> Result<Outcome, RunError> {
-    let site = Site::<D>::new(plan, settings.flow.clone())?;
+    let flow = match &settings.flow {
+        Some(flow) => Some(flow.clone()),
+        None => build::of(plan)
+            .map_err(|error| RunError::Flow(error.to_string()))?
+            .map(|solution| Arc::new(solution.flow)),
+    };
+    let site = Site::<D>::new(plan, flow)?;
     match (&site.transport.flow, &site.transport.dispersion) {
         (Flow::Uniform(velocity), Dispersion::Constant(_) | Dispersion::Velocity { .. })
             if is_constant(&site.transport.porosity) =>
@@ -195,7 +203,7 @@ fn go<const D: usize, M: Medium<D>>(
             break;
         }
         let next_due = dues.peek().map_or(n_steps, |due| due.steps.max(step + 1));
-        let end = next_due.min(step + TILE).min(n_steps);
+        let end = next_due.min(step + run.tile_length()).min(n_steps);
         // The last step may have another length.
         let end = if end == n_steps && step + 1 < n_steps { n_steps - 1 } else { end };
         run.tile(step, end)?;
@@ -270,11 +278,46 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
         }
     }
 
+    /// Steps that can be taken together from one: what fills a box again looks at every step.
+    fn tile_length(&self) -> u64 {
+        let fills = |release: &Release<D>| matches!(release.kind, Kind::Filled { .. });
+        if self.releases.iter().any(fills) { 1 } else { TILE }
+    }
+
+    /// Takes out what is in the boxes that are filled again at `t`.
+    fn empty_boxes(&mut self, t: f64) {
+        let mut events = Vec::new();
+        for release in &self.releases {
+            let Kind::Filled { low, high, from, to, .. } = &release.kind else { continue };
+            if t < *from || t >= *to {
+                continue;
+            }
+            let inside = |x: [f64; D]| (0..D).all(|axis| x[axis] >= low[axis] && x[axis] <= high[axis]);
+            for flock in self.flocks.iter_mut().filter(|flock| flock.population == release.population) {
+                let mut kept = 0;
+                for idx in 0..flock.len() {
+                    let (id, position) = (flock.ids[idx], flock.position(idx));
+                    if inside(position) {
+                        let what = What::Replaced { origin: release.origin };
+                        let mass = self.units[flock::origin(id)];
+                        events.push(Event { what, population: flock.population, mass, t });
+                        continue;
+                    }
+                    flock.set(kept, id, position);
+                    kept += 1;
+                }
+                flock.truncate(kept);
+            }
+        }
+        self.note(&events);
+    }
+
     /// Takes everything through steps of equal length.
     fn tile(&mut self, first: u64, end: u64) -> Result<(), RunError> {
         let time = &self.site.plan.time;
         let dt = step_length(time, first);
         let t = first as f64 * time.step;
+        self.empty_boxes(t);
         let mut newborn: Vec<Vec<Birth<D>>> = Vec::new();
         for step in first..end {
             let window = Window { step, t: t + (step - first) as f64 * dt, dt };
@@ -324,11 +367,9 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
             Some(Trouble::Position { id, step }) => {
                 Err(RunError::NonFinitePosition { step: step + 1, particle: flock::count(id) })
             }
-            Some(Trouble::SubSteps(TooManySubSteps { id, step })) => Err(RunError::Plan(format!(
-                "particle {} needs too many sub-steps in step {}",
-                flock::count(id),
-                step + 1
-            ))),
+            Some(Trouble::SubSteps(TooManySubSteps { id, step })) => {
+                Err(RunError::TooManySubSteps { step: step + 1, particle: flock::count(id) })
+            }
         }
     }
 
