@@ -7,8 +7,8 @@ use lamella::engine::snapshot::Values;
 use lamella::maths::scalar::{erf, erfc, exp};
 use lamella::plan::tape::{Binary, Operation, Tape, Unary};
 use lamella::plan::transport::{
-    Conductivity, Darcy, DarcySide, Dispersion, Flow, Interface, Patch, Population, Region, SideRule, Source,
-    Strength, Transport,
+    Conductivity, Covariance, Darcy, DarcySide, Dispersion, Flow, Interface, Patch, Population, Region,
+    SideRule, Source, Strength, SubSteps, Transport,
 };
 use lamella::plan::{Axis, Output, OutputKind, Plan, Quantity, Side};
 use support::{constant, output, plain, run, run_with, walk};
@@ -413,5 +413,49 @@ fn particles_follow_a_flow_that_is_solved_for() {
         // v = K i/φ: 4 m in the lower layer, 2 m in the upper; 32-bit displacements.
         let exact = 1.0 + if *y < 0.5 { 4.0 } else { 2.0 };
         assert!((x - exact).abs() < 1e-5, "{x} at {y}");
+    }
+}
+
+/// What is uniform stays uniform in a random flow with inflow and outflow, at steps of up to half a cell.
+#[test]
+fn uniform_stays_uniform_in_a_random_flow() {
+    let inflow = SideRule::Inflow(vec![constant(1.0)]);
+    let sides = [[inflow, SideRule::Outflow], [SideRule::Reflect, SideRule::Reflect]];
+    let mut plan = scene(&[0.0, 0.0], &[100.0, 40.0], &sides, 400_000, 100.0, 100.0);
+    let setup = transport(&mut plan);
+    setup.flow = Flow::Darcy(Box::new(Darcy {
+        cells: vec![100, 40],
+        sides: vec![[DarcySide::Head(100.0), DarcySide::Head(0.0)], [DarcySide::NoFlow, DarcySide::NoFlow]],
+        conductivity: Conductivity::Lognormal {
+            geometric_mean: 1.0,
+            variance: 1.0,
+            covariance: Covariance::Exponential,
+            lengths: vec![8.0, 8.0],
+            seed: 1,
+        },
+        anisotropy: vec![1.0, 1.0],
+        wells: vec![],
+    }));
+    setup.dispersion = Dispersion::Velocity {
+        longitudinal: 0.5,
+        transverse: 0.1,
+        transverse_vertical: 0.1,
+        molecular: 1e-3,
+    };
+    setup.populations[0].initial = constant(1.0);
+    setup.sub_steps = Some(SubSteps { courant: 0.25, dispersion: 0.1 });
+    plan.outputs = vec![of(OutputKind::Map, vec![25, 10], vec![100.0])];
+    let (outcome, snapshots) = run(&plan);
+    assert!(outcome.worst_defect() < 1e-12);
+    let Values::Binned { mean, standard_error, .. } = &snapshots[0].values else { panic!() };
+    let chi: f64 = mean[0].iter().zip(&standard_error[0]).map(|(m, e)| ((m - 1.0) / e).powi(2)).sum();
+    println!(
+        "chi {} mean {} steps {}",
+        chi / 250.0,
+        mean[0].iter().sum::<f64>() / 250.0,
+        outcome.labour.steps
+    );
+    for row in mean[0].chunks(10) {
+        println!("{row:.3?}");
     }
 }
