@@ -1,5 +1,7 @@
 //! Random walks on cells beside those in a uniform medium: ns per particle and step, one core.
 
+#![allow(clippy::print_stdout)] // What a bench is for.
+
 use lamella::engine::track::cells::{CellMedium, Dispersivity};
 use lamella::engine::track::medium::{Carrier, Medium};
 use lamella::engine::track::monitors::Crossing;
@@ -85,8 +87,8 @@ fn time<const D: usize, M: Medium<D>>(name: &str, medium: M, high: [f64; D], dt:
             let range = first..(first + 64).min(ids.len());
             bench.lanes.load(&ids[range.clone()], positions.each_ref().map(|axis| &axis[range.clone()]));
             width.run(Go { tracker: &tracker, steps, bench: &mut bench });
-            for axis in 0..D {
-                positions[axis][range.clone()].copy_from_slice(&bench.lanes.positions[axis][..range.len()]);
+            for (to, from) in positions.iter_mut().zip(&bench.lanes.positions) {
+                to[range.clone()].copy_from_slice(&from[..range.len()]);
             }
         }
         best = best.min((cpu() - start) / (ids.len() as f64 * tile as f64));
