@@ -7,6 +7,7 @@ use crate::chemistry::Why;
 use crate::diagnostic::codes::{F103, R101, R102, R103, R104, R106, R107, R108};
 use crate::diagnostic::{Code, Diagnostic, precise};
 use crate::engine::RunError;
+use crate::plan::chemistry::Integrator;
 use crate::plan::limits::{round_down, short};
 use crate::plan::time_scales::TimeScales;
 use crate::plan::{OutputKind, Plan};
@@ -226,6 +227,12 @@ impl Place<'_> {
                 let text = format!("the fastest reaction: 1/k = {} s", short(1.0 / scales.fastest_rate()));
                 message = message.also(reaction.span, text);
             }
+        }
+        let asked = self.plan.chemistry.as_ref().map(|chemistry| chemistry.integrator);
+        if asked == Some(Integrator::Explicit) {
+            message = message.help(
+                "write `chemistry integrator rosenbrock`, or leave it to `auto`: what is stiff takes an explicit integrator ever more sub-steps",
+            );
         }
         let needed = MARGIN * share * step;
         let n_steps = time.duration / needed;

@@ -88,10 +88,11 @@ impl Symbolic {
             a[pivot.slot as usize] = *diagonal;
         }
         for (&slot, &place) in self.entries.iter().zip(places) {
-            let (slot, entry) = (&mut a[slot as usize], &jacobian[usize::from(place)]);
+            let (mut value, entry) = (a[slot as usize], &jacobian[usize::from(place)]);
             for l in 0..LANES {
-                slot[l] -= entry[l];
+                value[l] -= entry[l];
             }
+            a[slot as usize] = value;
         }
     }
 
@@ -105,17 +106,19 @@ impl Symbolic {
             }
             a[pivot.slot as usize] = inverse;
             for &[slot, _] in &self.lower[pivot.lower.clone()] {
-                let entry = &mut a[slot as usize];
+                let mut entry = a[slot as usize];
                 for l in 0..LANES {
                     entry[l] *= inverse[l];
                 }
+                a[slot as usize] = entry;
             }
             for &[target, left, right] in &self.updates[pivot.updates.clone()] {
                 let (left, right) = (a[left as usize], a[right as usize]);
-                let target = &mut a[target as usize];
+                let mut value = a[target as usize];
                 for l in 0..LANES {
-                    target[l] -= left[l] * right[l];
+                    value[l] -= left[l] * right[l];
                 }
+                a[target as usize] = value;
             }
         }
     }
@@ -126,10 +129,11 @@ impl Symbolic {
         for pivot in &self.pivots {
             let known = b[pivot.row as usize];
             for &[slot, row] in &self.lower[pivot.lower.clone()] {
-                let (entry, target) = (&a[slot as usize], &mut b[row as usize]);
+                let (entry, mut value) = (&a[slot as usize], b[row as usize]);
                 for l in 0..LANES {
-                    target[l] -= entry[l] * known[l];
+                    value[l] -= entry[l] * known[l];
                 }
+                b[row as usize] = value;
             }
         }
         for pivot in self.pivots.iter().rev() {

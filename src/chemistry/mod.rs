@@ -15,6 +15,7 @@ mod matrix;
 mod observed;
 #[cfg(test)]
 mod orders;
+mod queue;
 mod reactor;
 mod reversal;
 mod rosenbrock;

@@ -15,7 +15,7 @@ use super::laws::{Basis, System};
 use super::matrix::Symbolic;
 use super::rosenbrock::Rosenbrock;
 use crate::maths::wide::Width;
-use crate::plan::chemistry::{Chemistry, Equilibrium, Kinetics, Law, Method};
+use crate::plan::chemistry::{Chemistry, Equilibrium, Integrator as Asked, Kinetics, Law, Method};
 use crate::plan::{Plan, Species};
 use std::sync::atomic::{AtomicU64, Ordering};
 
@@ -41,11 +41,12 @@ enum Integrator {
     Pair(Pair),
     Saturation(Saturation),
     Zero(Zero),
-    /// With error control. `is_explicit`: tried first.
+    /// With error control. `is_explicit`: tried first; `is_asked_for`: and nothing else.
     Adaptive {
         network: Box<Network>,
         symbolic: Symbolic,
         is_explicit: bool,
+        is_asked_for: bool,
     },
 }
 
@@ -222,7 +223,7 @@ impl Reactor {
     }
 
     fn integrate(&self, batch: Batch<'_>, scratch: &mut Scratch) -> Result<Work, Failure> {
-        let Integrator::Adaptive { network, symbolic, is_explicit } = &self.integrator else {
+        let Integrator::Adaptive { network, symbolic, is_explicit, is_asked_for } = &self.integrator else {
             return Ok(Work::default());
         };
         let Scratch { lanes, failures, left_over, .. } = scratch;
@@ -237,12 +238,15 @@ impl Reactor {
             chosen: None,
             work: Work::default(),
             failures,
-            ends_at_failure: !is_explicit,
+            ends_at_failure: !is_explicit || *is_asked_for,
         };
         if *is_explicit {
             integrate(self.width, network, &Explicit { network }, lanes, &mut task);
             if task.failures.is_empty() {
                 return Ok(task.work);
+            }
+            if *is_asked_for {
+                return first_failure(&task);
             }
             // Too stiff after all.
             left_over.clear();
@@ -252,10 +256,7 @@ impl Reactor {
             task.ends_at_failure = true;
         }
         integrate(self.width, network, &Rosenbrock { network, symbolic, aqueous }, lanes, &mut task);
-        match task.failures.iter().min_by_key(|failure| failure.particle) {
-            Some(failure) => Err(*failure),
-            None => Ok(task.work),
-        }
+        first_failure(&task)
     }
 
     /// The first-order network over a time, if the method of the plan is one: see [`Propagator`].
@@ -334,7 +335,8 @@ impl Integrator {
                 let is_explicit = kinetics.method == Method::Explicit && !system.is_gated;
                 let invariants = Invariants::new(n, &changes);
                 let network = Box::new(Network { system, invariants, small, tolerance });
-                Self::Adaptive { network, symbolic, is_explicit }
+                let is_asked_for = is_explicit && chemistry.integrator == Asked::Explicit;
+                Self::Adaptive { network, symbolic, is_explicit, is_asked_for }
             }
         })
     }
@@ -357,7 +359,14 @@ impl Integrator {
         let symbolic = Symbolic::new(n, &everywhere);
         let invariants = Invariants::new(n, &changes);
         let network = Box::new(Network { system, invariants, small, tolerance });
-        Ok(Self::Adaptive { network, symbolic, is_explicit: false })
+        Ok(Self::Adaptive { network, symbolic, is_explicit: false, is_asked_for: false })
+    }
+}
+
+fn first_failure(task: &Task<'_, '_>) -> Result<Work, Failure> {
+    match task.failures.iter().min_by_key(|failure| failure.particle) {
+        Some(failure) => Err(*failure),
+        None => Ok(task.work),
     }
 }
 

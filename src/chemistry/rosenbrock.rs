@@ -3,6 +3,8 @@
 //! Owns the coefficients and one step over lanes. May use the laws, sparse matrices and the driver of
 //! steps. It deliberately controls no step size.
 
+#![allow(clippy::needless_range_loop)] // Zipped iterators are not always inlined; these loops are hot.
+
 use super::aqueous::Aqueous;
 use super::integrate::{Lanes, Network, Stepper};
 use super::laws::{LANES, Lane};
@@ -81,6 +83,7 @@ pub(super) struct Rosenbrock<'a> {
 
 impl Stepper for Rosenbrock<'_> {
     const MOST_STEPS: u32 = 200_000;
+    const KEEPS_SLOPES: bool = false;
 
     fn exponent(&self) -> f64 {
         4.0
@@ -115,6 +118,10 @@ impl Stepper for Rosenbrock<'_> {
             *slope = full[usize::from(place)];
         }
         rates_of_place(n, positions, &mut lanes.rates);
+    }
+
+    fn start(&self, _: &mut Lanes, _: f64) -> u64 {
+        0
     }
 
     #[inline(always)]
@@ -181,9 +188,11 @@ impl Rosenbrock<'_> {
                 continue;
             }
             for (target, earlier) in own[..n].iter_mut().zip(&done[j * n..]) {
+                let mut sum = *target;
                 for l in 0..LANES {
-                    target[l] += coefficient * inverse[l] * earlier[l];
+                    sum[l] += coefficient * inverse[l] * earlier[l];
                 }
+                *target = sum;
             }
         }
         if system.reads_time && RODAS4.gammas[stage] != 0.0 {
@@ -203,9 +212,12 @@ impl Rosenbrock<'_> {
 pub(super) fn load(is_positive: &[bool], y: &[Lane], registers: &mut [Lane]) {
     for ((value, &is_positive), register) in y.iter().zip(is_positive).zip(registers) {
         if is_positive {
+            // A copy, here and elsewhere: what may overlap is not compiled wide.
+            let mut lane = *value;
             for l in 0..LANES {
-                register[l] = if value[l] < 0.0 { 0.0 } else { value[l] };
+                lane[l] = if lane[l] < 0.0 { 0.0 } else { lane[l] };
             }
+            *register = lane;
         } else {
             *register = *value;
         }

@@ -26,6 +26,14 @@ pub struct Chemistry {
     pub integrator: Integrator,
 }
 
+impl Chemistry {
+    /// Whether rates are integrated in sub-steps.
+    pub fn has_error_control(&self) -> bool {
+        let method = self.kinetics.as_ref().map(|kinetics| kinetics.method);
+        matches!(method, Some(Method::Explicit | Method::Rosenbrock))
+    }
+}
+
 /// Reactions at finite rates.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Kinetics {

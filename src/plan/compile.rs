@@ -95,7 +95,7 @@ fn compile_from(
     }
     passes::run(&mut draft, |pass| options.passes.takes(pass));
     integrator::choose(&mut draft.plan, scales.as_ref());
-    let cost = cost::estimate(&draft.plan);
+    let cost = cost::estimate(&draft.plan, scales.as_ref());
     let (limits, found) = limits::check(scenario, &draft, scales.as_ref(), &cost, options.memory);
     let diagnostics = [warnings, found].concat();
     if crate::diagnostic::any_fatal(&diagnostics) {

@@ -1,6 +1,8 @@
 //! What a run will cost: time from a table of measured stage costs, memory from the state.
 
-use super::chemistry::Method;
+use super::chemistry::{Chemistry, Method};
+use super::integrator::Expected;
+use super::time_scales::TimeScales;
 use super::{Normals, Output, OutputKind, Plan, Stage, ZoneRate};
 use serde::Serialize;
 
@@ -20,10 +22,17 @@ mod table {
     pub(super) const CLOSED_FORM: f64 = 8.0;
     /// One entry of a matrix exponential applied.
     pub(super) const PROPAGATE: f64 = 0.5;
-    /// One operation of the laws in an explicit sub-step of seven stages.
-    pub(super) const EXPLICIT: f64 = 8.0;
-    /// One operation of the laws or of the elimination in an implicit sub-step.
-    pub(super) const ROSENBROCK: f64 = 10.0;
+    /// A sub-step with either integrator: as such, per component, and per operation of the laws.
+    pub(super) const EXPLICIT: [f64; 3] = [30.0, 6.0, 1.0];
+    pub(super) const ROSENBROCK: [f64; 3] = [30.0, 8.0, 2.5];
+    /// One component brought together from its zones, taken back where that is needed, and given out again.
+    pub(super) const GATHER: f64 = 15.0;
+    /// One species of one speciation from scratch.
+    pub(super) const SPECIATE: f64 = 250.0;
+    /// Speciations from scratch that those of an implicit sub-step are worth.
+    pub(super) const SPECIATIONS: f64 = 2.0;
+    /// Sub-steps of a step if time scales are not known: what is taken at a constant rate runs out somewhere.
+    pub(super) const UNKNOWN: f64 = 6.0;
     /// One particle observed once: positions worked out again, species restored, sums.
     pub(super) const OBSERVE: f64 = 25.0;
     /// One value of a bin observed once: its sums, mean and error.
@@ -67,8 +76,8 @@ pub fn n_stored_values(plan: &Plan) -> usize {
     }
 }
 
-/// Works the estimate out.
-pub fn estimate(plan: &Plan) -> Cost {
+/// Works the estimate out. Without time scales the sub-steps of reactions are those of a slow network.
+pub fn estimate(plan: &Plan, scales: Option<&TimeScales>) -> Cost {
     let n_axes = plan.axes.len() as f64;
     let n_particles = plan.particles.count as f64;
     let n_values = (plan.components.len() * n_stored_values(plan)) as f64;
@@ -80,7 +89,7 @@ pub fn estimate(plan: &Plan) -> Cost {
         Normals::Single => table::MOVE_SINGLE,
         Normals::Double => table::MOVE_DOUBLE,
     };
-    let react_cost = react_cost(plan);
+    let react_cost = react_cost(plan, scales);
     let cost_of = |stage: Stage| match stage {
         Stage::Mix => table::MIX * n_relaxed,
         Stage::React => react_cost,
@@ -102,7 +111,7 @@ pub fn estimate(plan: &Plan) -> Cost {
     let n_binned: f64 =
         plan.outputs.iter().map(|output| output.times.len() as f64 * binned_values(output)).sum();
     let nanoseconds = per_step * particle_steps
-        + table::OBSERVE * n_observations as f64 * n_particles
+        + (table::OBSERVE + speciation_cost(plan)) * n_observations as f64 * n_particles
         + (table::OBSERVE_BIN + table::WRITE_ROW) * n_binned;
     let n_bins: f64 = plan.axes.iter().map(|axis| axis.bins as f64).product();
     Cost {
@@ -115,19 +124,43 @@ pub fn estimate(plan: &Plan) -> Cost {
     }
 }
 
-/// Nanoseconds per particle and step; how many sub-steps stiff laws take is not known before the run.
-fn react_cost(plan: &Plan) -> f64 {
-    let Some(kinetics) = plan.chemistry.as_ref().and_then(|chemistry| chemistry.kinetics.as_ref()) else {
-        return 0.0;
-    };
+/// Nanoseconds per particle and step, with the sub-steps that are expected.
+fn react_cost(plan: &Plan, scales: Option<&TimeScales>) -> f64 {
+    let Some(chemistry) = &plan.chemistry else { return 0.0 };
+    let Some(kinetics) = &chemistry.kinetics else { return 0.0 };
     let n = plan.components.len() as f64;
-    match kinetics.method {
-        Method::Observed => 0.0,
+    let price = |[own, component, operation]: [f64; 3]| {
+        own + component * n + operation * kinetics.laws.operations.len() as f64
+    };
+    let integrated = match kinetics.method {
+        Method::Observed => return 0.0,
         Method::Pair | Method::Saturation | Method::Zero => table::CLOSED_FORM,
         Method::Exponential => table::PROPAGATE * n * n,
-        Method::Explicit => table::EXPLICIT * kinetics.laws.operations.len() as f64,
-        Method::Rosenbrock => table::ROSENBROCK * (kinetics.laws.operations.len() as f64 + n * n * n / 3.0),
+        Method::Explicit => sub_steps(plan, chemistry, scales) * price(table::EXPLICIT),
+        Method::Rosenbrock => {
+            let speciations = table::SPECIATIONS * speciation_cost(plan);
+            sub_steps(plan, chemistry, scales) * (price(table::ROSENBROCK) + speciations)
+        }
+    };
+    if plan.mixing.is_some() || plan.has_immobile() { integrated + table::GATHER * n } else { integrated }
+}
+
+fn sub_steps(plan: &Plan, chemistry: &Chemistry, scales: Option<&TimeScales>) -> f64 {
+    let is_explicit = chemistry.kinetics.as_ref().is_some_and(|kinetics| kinetics.method == Method::Explicit);
+    match scales.map(|scales| Expected::new(scales, chemistry, plan.components.len())) {
+        Some(expected) if is_explicit => expected.explicit,
+        Some(expected) => expected.implicit,
+        None if chemistry.equilibrium.is_some() => 1.0,
+        None => table::UNKNOWN,
     }
+}
+
+/// Nanoseconds of one speciation of one particle; none without equilibrium.
+fn speciation_cost(plan: &Plan) -> f64 {
+    let equilibrium = plan.chemistry.as_ref().and_then(|chemistry| chemistry.equilibrium.as_ref());
+    equilibrium.map_or(0.0, |own| {
+        table::SPECIATE * (own.primaries.len() + own.secondaries.len() + own.minerals.len()) as f64
+    })
 }
 
 /// Bins times quantities of one observation; none for what has no value per bin.

@@ -99,8 +99,8 @@ fn method_line(method: Method) -> &'static str {
         Method::Pair => "one reaction of second order: closed form, exact",
         Method::Saturation => "one saturating reaction: closed form (Lambert W), exact",
         Method::Zero => "one reaction of order zero: closed form, to the end of its scarcest reactant",
-        Method::Explicit => "not stiff: explicit, Dormand-Prince 5(4), sub-steps per particle",
-        Method::Rosenbrock => "stiff: L-stable, Rodas4, exact Jacobian, sub-steps per particle",
+        Method::Explicit => "explicit: Dormand-Prince 5(4), sub-steps per particle",
+        Method::Rosenbrock => "implicit: Rodas4, L-stable, exact Jacobian, sub-steps per particle",
     }
 }
 

@@ -4,6 +4,7 @@
 //! being long against a reaction: sub-steps resolve that, and taking turns with exchange is what is judged.
 
 use super::chemistry::{Method, Splitting};
+use super::integrator::Expected;
 use super::limits::{Limit, dispersion, short};
 use super::time_scales::TimeScales;
 use super::{Plan, ZoneRate};
@@ -48,7 +49,7 @@ pub(super) fn check(
         name: "fastest reaction per step".into(),
         formula: "|dr/dc . nu| dt",
         value: rate * plan.time.step,
-        advice: "above 5 integrators are implicit",
+        advice: "any: sub-steps are as short as they must be",
     });
     limits.push(Limit {
         name: "stiffness".into(),
@@ -56,8 +57,29 @@ pub(super) fn check(
         value: scales.stiffness(),
         advice: "any: implicit integrators do not mind",
     });
+    sub_steps(plan, scales, limits);
     damkohler(plan, rate, limits);
     splitting(scenario, plan, scales, limits, diagnostics);
+}
+
+/// What decides between explicit and implicit integration.
+fn sub_steps(plan: &Plan, scales: &TimeScales, limits: &mut Vec<Limit>) {
+    let Some(chemistry) = plan.chemistry.as_ref().filter(|chemistry| chemistry.has_error_control()) else {
+        return;
+    };
+    let expected = Expected::new(scales, chemistry, plan.components.len());
+    limits.push(Limit {
+        name: "sub-steps of an explicit integrator".into(),
+        formula: "about int |dr/dc . nu| dt / 3.3 in a step, or as accuracy asks",
+        value: expected.explicit,
+        advice: "it is taken where this is less than those of an implicit one times what they cost",
+    });
+    limits.push(Limit {
+        name: "the same for an implicit one, in explicit ones".into(),
+        formula: "about as accuracy asks, times what its matrix costs",
+        value: expected.price * expected.implicit,
+        advice: "above the explicit ones the network is not stiff over a step",
+    });
 }
 
 /// Fastest reaction against transport over the domain and against exchange.

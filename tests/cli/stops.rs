@@ -60,6 +60,29 @@ fn a_step_with_too_many_sub_steps_names_one_that_works() {
     assert_eq!((&row["fate"], &row["code"], &row["line"]), (&"stopped".into(), &"R106".into(), &11.into()));
 }
 
+/// An explicit integrator that was asked for and cannot do it names the one that can.
+#[test]
+fn a_stiff_network_with_an_explicit_integrator_names_the_other() {
+    let folder = Folder::new();
+    let chemistry = |integrator: &str| {
+        format!(
+            "species A, B, C\nreaction both: A <-> B @ forward 1e3 /s, backward 1e3 /s\n\
+             reaction end: 2 B -> C @ 1 L/mol/s\nchemistry integrator {integrator}"
+        )
+    };
+    let scene = |integrator| {
+        batch(&chemistry(integrator), "A = 1 mol/L", "run to 20 s, step 20 s", "A, B, C at t = 20 s")
+    };
+    folder.write("s.lam", scene("explicit"));
+    let message = stop(&folder);
+    assert_eq!(message["code"], "R106", "{message}");
+    assert!(help(&message).contains("`chemistry integrator rosenbrock`"), "{message}");
+    for integrator in ["rosenbrock", "auto"] {
+        folder.write("s.lam", scene(integrator));
+        folder.lamella(&["run", "s.lam", "--out", integrator]).exits(0);
+    }
+}
+
 #[test]
 fn reactions_that_cannot_be_followed_show_the_line_of_their_rate() {
     let cases = [

@@ -3,7 +3,7 @@
 use super::network::{Network, step};
 use lamella::plan::chemistry::Method;
 
-const TOLERANCES: [f64; 3] = [1e-4, 1e-6, 1e-8];
+const TOLERANCES: [f64; 4] = [1e-3, 1e-4, 1e-6, 1e-8];
 
 /// Integrates and compares all components above the floor. The references hold ten digits or more.
 fn check(network: &Network, floor: f64, start: &[f64], t: f64, right: &[f64]) {
@@ -41,7 +41,8 @@ fn robertson_to_the_end() {
         assert!(y.iter().all(|value| *value > 0.0));
         assert!((y.iter().sum::<f64>() - 1.0).abs() < 1e-13, "{y:?}");
         // A falls like 1/t: a quarter of its value at 1e11, up to 1e-6.
-        assert!((4.0 * y[0] / late[0] - 1.0).abs() < 1e-5, "{y:?}");
+        let bound = if tolerance > 1e-4 { 10.0 * tolerance } else { 1e-5 };
+        assert!((4.0 * y[0] / late[0] - 1.0).abs() < bound, "{y:?}");
     }
 }
 
