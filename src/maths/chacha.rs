@@ -46,7 +46,12 @@ pub fn draw(key: &[u32; 8], stream: u64, draw: u64, words: &mut Words) {
 /// Equation, symbols, range, source and shape are those of [`draw`]; the counters may be any.
 #[inline(always)]
 pub fn draw_each(key: &[u32; 8], stream: u64, counters: &[u64; LANES], words: &mut Words) {
-    blocks(key, stream, |lane| (counters[lane] as u32, (counters[lane] >> 32) as u32), words);
+    // Halves apart, as a loop is as narrow as its widest number.
+    let (mut low, mut high) = ([0; LANES], [0; LANES]);
+    for ((low, high), counter) in low.iter_mut().zip(&mut high).zip(counters) {
+        (*low, *high) = (*counter as u32, (counter >> 32) as u32);
+    }
+    blocks(key, stream, |lane| (low[lane], high[lane]), words);
 }
 
 /// The sixteen words of one cipher block.

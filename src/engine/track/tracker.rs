@@ -88,10 +88,14 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
         events: &mut impl Events,
     ) -> Result<(), TooManySubSteps> {
         bench.normals.clear();
+        if self.criteria.is_none() {
+            bench.leap.assign(&[steps.dt; LANES]);
+        }
         let mut late = entered;
         for step in steps.first..steps.end {
             let t = steps.t + (step - steps.first) as f64 * steps.dt;
             let mut left = [steps.dt; LANES];
+            let is_late = late.is_some();
             if let Some(entered) = late.take() {
                 for lane in 0..LANES {
                     left[lane] = steps.dt * (1.0 - entered[lane]);
@@ -99,11 +103,15 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
             }
             match &self.criteria {
                 None => {
-                    bench.leap.assign(&left);
+                    if is_late {
+                        bench.leap.assign(&left);
+                    }
                     self.medium.look(carrier, &bench.lanes.positions, &mut bench.look);
-                    let start: Lane = left.map(|left| t + (steps.dt - left));
-                    self.displace(carrier, step, &start, bench, events);
+                    self.displace(carrier, step, t + steps.dt, &left, bench, events);
                     bench.displacements += bench.lanes.n as u64;
+                    if is_late {
+                        bench.leap.assign(&[steps.dt; LANES]);
+                    }
                 }
                 Some(criteria) => {
                     self.sub_steps(carrier, criteria, (step, t + steps.dt), left, bench, events)?
@@ -131,7 +139,7 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
         for sub_step in 0..MOST_SUB_STEPS {
             self.medium.look(carrier, &bench.lanes.positions, &mut bench.look);
             self.medium.longest(&bench.look, criteria, &mut time);
-            let start: Lane = left.map(|left| end - left);
+            let before = left;
             let mut is_going = 0_u64;
             for lane in 0..LANES {
                 // A sliver of a sub-step is taken with the one before it.
@@ -141,7 +149,7 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
                 bench.displacements += u64::from(lane < bench.lanes.n && time[lane] > 0.0);
             }
             bench.leap.assign(&time);
-            self.displace(carrier, step * MOST_SUB_STEPS + sub_step, &start, bench, events);
+            self.displace(carrier, step * MOST_SUB_STEPS + sub_step, end, &before, bench, events);
             let going = is_going & bench.lanes.occupied() & !bench.lanes.gone;
             if going == 0 {
                 return Ok(());
@@ -153,13 +161,14 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
         Ok(())
     }
 
-    /// One displacement of all lanes from `start` on, over the times of the leap.
+    /// One displacement of all lanes over the times of the leap; it begins when so much is `left` to the `end`.
     #[inline(always)]
     fn displace(
         &self,
         carrier: &Carrier,
         number: u64,
-        start: &Lane,
+        end: f64,
+        left: &Lane,
         bench: &mut Bench<D, M>,
         events: &mut impl Events,
     ) {
@@ -186,12 +195,12 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
         }
         for (idx, plane) in self.planes.iter().enumerate() {
             plane.crossings(&before, lanes, was_gone, |crossing| {
-                let t = start[crossing.lane] + crossing.fraction * leap.time[crossing.lane];
+                let t = end - left[crossing.lane] + crossing.fraction * leap.time[crossing.lane];
                 events.crossed(lanes.ids[crossing.lane], idx, crossing, t);
             });
         }
         for exit in exits.drain(..) {
-            let t = start[exit.lane] + exit.fraction * leap.time[exit.lane];
+            let t = end - left[exit.lane] + exit.fraction * leap.time[exit.lane];
             events.left(lanes.ids[exit.lane], exit, t);
         }
     }

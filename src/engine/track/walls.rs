@@ -157,17 +157,44 @@ impl<const D: usize> Ends<D> {
                 for lane in 0..LANES {
                     spread[lane] *= stride.leap.time[lane];
                 }
-                for (end, wall) in walls.iter().enumerate() {
-                    let Some(wall) = wall else { continue };
-                    let near = wall.near(axis, end, stride.before, &lanes.positions, &spread);
-                    let near = near & lanes.occupied() & !lanes.gone;
-                    if near != 0 {
-                        wall.meet([axis, end], near, stride, lanes, &spread, exits);
+                let at = [0, 1].map(|end| walls[end].as_ref().map(|wall| wall.at));
+                let near = near(at, &stride.before[axis], &lanes.positions[axis], &spread);
+                let near = near & lanes.occupied() & !lanes.gone;
+                if near != 0 {
+                    for (end, wall) in walls.iter().enumerate() {
+                        if let Some(wall) = wall {
+                            wall.meet([axis, end], near & !lanes.gone, stride, lanes, &spread, exits);
+                        }
                     }
                 }
             }
         }
     }
+}
+
+/// One bit per particle that may have touched either wall.
+#[inline(always)]
+fn near(at: [Option<f64>; 2], before: &Lane, after: &Lane, spread: &Lane) -> u64 {
+    // A wall that is not there is far away.
+    const NOWHERE: f64 = 1e300;
+    let low = at[0].unwrap_or(-NOWHERE);
+    let high = at[1].unwrap_or(NOWHERE);
+    let mut is_near = [0_u8; LANES];
+    let mut any = 0_u8;
+    for lane in 0..LANES {
+        let least = |x: f64| {
+            let (above, below) = (x - low, high - x);
+            if above < below { above } else { below }
+        };
+        let (from, to) = (least(before[lane]), least(after[lane]));
+        let near = u8::from(to < 0.0) | u8::from(2.0 * from * to < FAR * spread[lane]);
+        is_near[lane] = near;
+        any |= near;
+    }
+    if any == 0 {
+        return 0;
+    }
+    (0..LANES).fold(0, |mask, lane| mask | u64::from(is_near[lane]) << lane)
 }
 
 /// `x ← x − L ⌊(x − low)/L⌋`
@@ -189,25 +216,6 @@ fn wrap(positions: &mut Lane, low: f64, high: f64) {
 }
 
 impl<const D: usize> Wall<D> {
-    /// One bit per particle that may have touched the wall.
-    #[inline(always)]
-    fn near(&self, axis: usize, end: usize, before: &[Lane; D], after: &[Lane; D], spread: &Lane) -> u64 {
-        let sign = if end == 0 { 1.0 } else { -1.0 };
-        let mut is_near = [0_u8; LANES];
-        let mut any = 0_u8;
-        for lane in 0..LANES {
-            let from = sign * (before[axis][lane] - self.at);
-            let to = sign * (after[axis][lane] - self.at);
-            let near = u8::from(to < 0.0) | u8::from(2.0 * from * to < FAR * spread[lane]);
-            is_near[lane] = near;
-            any |= near;
-        }
-        if any == 0 {
-            return 0;
-        }
-        (0..LANES).fold(0, |mask, lane| mask | u64::from(is_near[lane]) << lane)
-    }
-
     /// Works out what the wall does to the particles of a mask.
     #[cold]
     #[inline(never)]
@@ -228,6 +236,9 @@ impl<const D: usize> Wall<D> {
             let from = (sign * (stride.before[axis][lane] - self.at)).max(0.0);
             let to = sign * (lanes.positions[axis][lane] - self.at);
             let way = Way { from, to, spread: spread[lane] };
+            if !(to < 0.0 || 2.0 * from * to < FAR * spread[lane]) {
+                continue;
+            }
             let mut place: [f64; D] = std::array::from_fn(|other| lanes.positions[other][lane]);
             place[axis] = self.at;
             let Some(patch) = self.patches.iter().position(|patch| patch.holds(&place, axis)) else {
