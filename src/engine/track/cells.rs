@@ -11,6 +11,8 @@ use crate::flow::FaceFlow;
 
 /// Corners of a cell in three dimensions.
 const CORNERS: usize = 8;
+/// Fours of numbers that a particle reads there.
+const MOST_QUADS: usize = n_quads::<3>();
 
 /// Dispersivities, m, and molecular diffusion, m²/s.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,12 +26,10 @@ pub struct Dispersivity {
 #[derive(Debug, Clone, PartialEq)]
 pub struct CellMedium<const D: usize> {
     ruler: [Ruler; D],
-    /// Pore velocity through the faces normal to each axis, m/s.
-    faces: [Vec<f32>; D],
-    /// Pore velocity at the corners, component by component, m/s.
-    corners: Vec<[f32; D]>,
-    face_strides: [[usize; D]; D],
-    corner_strides: [usize; D],
+    strides: [usize; D],
+    /// Per cell what a particle in it reads: pore velocities through the lower and the upper face of each axis,
+    /// then those at the corners (last axis fastest), component by component, m/s; four at a time.
+    quads: Vec<[f32; 4]>,
     dispersivity: Dispersivity,
 }
 
@@ -73,36 +73,99 @@ impl<const D: usize> CellMedium<D> {
         if !is_even || porosity <= 0.0 {
             return None;
         }
-        let faces = axes.map(|axis| flow.flux[axis].iter().map(|q| (q / porosity) as f32).collect());
-        let face_strides = std::array::from_fn(|axis| {
-            let mut n = n;
-            n[axis] += 1;
-            strides(n)
-        });
-        let corner_strides = strides(n.map(|n| n + 1));
-        let mut medium =
-            Self { ruler, faces, corners: Vec::new(), face_strides, corner_strides, dispersivity };
-        medium.corners = medium.corner_velocities();
-        Some(medium)
+        let faces =
+            Faces { n, velocity: axes.map(|axis| flow.flux[axis].iter().map(|q| q / porosity).collect()) };
+        Some(Self { ruler, strides: strides(n), quads: faces.records(), dispersivity })
+    }
+
+    /// Velocities around each place: two faces per axis, and all corners.
+    #[inline(always)]
+    fn gather(&self, positions: &[Lane; D], around: &mut Around<D>) {
+        let Around { place, fraction, index, quads, .. } = around;
+        for axis in 0..D {
+            let Ruler { low, inverse_width, n } = self.ruler[axis];
+            let last = (n as f64).next_down();
+            let (x, place, fraction) = (&positions[axis], &mut place[axis], &mut fraction[axis]);
+            for lane in 0..LANES {
+                let along = (x[lane] - low) * inverse_width;
+                let along = if along > 0.0 { along } else { 0.0 };
+                let along = if along < last { along } else { last };
+                // On a face either cell will do: both say the same there.
+                let shifted = (along - 0.5) + SHIFT;
+                place[lane] = shifted.to_bits() as i32;
+                fraction[lane] = (along - (shifted - SHIFT)) as f32;
+            }
+        }
+        number(place, &self.strides, index);
+        for lane in 0..LANES {
+            let first = index[lane] as usize * n_quads::<D>();
+            let record = &self.quads[first..first + n_quads::<D>()];
+            for (q, own) in record.iter().enumerate() {
+                quads[4 * q][lane] = own[0];
+                quads[4 * q + 1][lane] = own[1];
+                quads[4 * q + 2][lane] = own[2];
+                quads[4 * q + 3][lane] = own[3];
+            }
+        }
+    }
+}
+
+/// Numbers that a particle reads of its cell.
+const fn n_numbers<const D: usize>() -> usize {
+    2 * D + (D << D)
+}
+
+/// The same in fours.
+const fn n_quads<const D: usize>() -> usize {
+    n_numbers::<D>().div_ceil(4)
+}
+
+/// Pore velocities through the faces normal to each axis.
+struct Faces<const D: usize> {
+    n: [usize; D],
+    velocity: [Vec<f64>; D],
+}
+
+impl<const D: usize> Faces<D> {
+    fn strides(&self, axis: usize) -> [usize; D] {
+        let mut n = self.n;
+        n[axis] += 1;
+        strides(n)
+    }
+
+    /// What particles read, cell by cell.
+    fn records(&self) -> Vec<[f32; 4]> {
+        let n_cells: usize = self.n.iter().product();
+        let mut quads = vec![[0.0; 4]; n_cells * n_quads::<D>()];
+        for cell in 0..n_cells {
+            let mut rest = cell;
+            let mut place = [0; D];
+            for axis in (0..D).rev() {
+                place[axis] = rest % self.n[axis];
+                rest /= self.n[axis];
+            }
+            let mut k = 0;
+            let mut put = |value: f64| {
+                quads[cell * n_quads::<D>() + k / 4][k % 4] = value as f32;
+                k += 1;
+            };
+            for axis in 0..D {
+                let strides = self.strides(axis);
+                let face: usize = (0..D).map(|other| place[other] * strides[other]).sum();
+                put(self.velocity[axis][face]);
+                put(self.velocity[axis][face + strides[axis]]);
+            }
+            for corner in 0..1_usize << D {
+                let at: [usize; D] = std::array::from_fn(|axis| place[axis] + (corner >> (D - 1 - axis) & 1));
+                (0..D).for_each(|axis| put(self.at_corner(at, axis)));
+            }
+        }
+        quads
     }
 
     /// Mean over the faces that touch a corner; they all have the same area.
-    fn corner_velocities(&self) -> Vec<[f32; D]> {
-        let n = self.ruler.each_ref().map(|ruler| ruler.n + 1);
-        let n_corners: usize = n.iter().product();
-        let corner = |idx: usize| {
-            let mut rest = idx;
-            let mut place = [0; D];
-            for axis in (0..D).rev() {
-                place[axis] = rest % n[axis];
-                rest /= n[axis];
-            }
-            std::array::from_fn(|axis| self.corner_velocity(place, axis))
-        };
-        (0..n_corners).map(corner).collect()
-    }
-
-    fn corner_velocity(&self, place: [usize; D], axis: usize) -> f32 {
+    fn at_corner(&self, place: [usize; D], axis: usize) -> f64 {
+        let strides = self.strides(axis);
         let (mut sum, mut count) = (0.0, 0.0);
         for choice in 0..1_usize << D {
             // The faces normal to the axis lie at the corner along it, on either side along the others.
@@ -112,61 +175,15 @@ impl<const D: usize> CellMedium<D> {
             }
             let along = |other: usize| match other == axis {
                 true => Some(place[other]),
-                false => (place[other] + side(other)).checked_sub(1).filter(|&k| k < self.ruler[other].n),
+                false => (place[other] + side(other)).checked_sub(1).filter(|&k| k < self.n[other]),
             };
-            let face: Option<usize> =
-                (0..D).map(|other| Some(along(other)? * self.face_strides[axis][other])).sum();
+            let face: Option<usize> = (0..D).map(|other| Some(along(other)? * strides[other])).sum();
             if let Some(face) = face {
-                sum += f64::from(self.faces[axis][face]);
+                sum += self.velocity[axis][face];
                 count += 1.0;
             }
         }
-        (sum / count) as f32
-    }
-
-    /// Velocities around each place: two faces per axis, and all corners.
-    #[inline(always)]
-    fn gather(&self, positions: &[Lane; D], around: &mut Around<D>) {
-        let Around { place, fraction, index, faces, corners } = around;
-        for axis in 0..D {
-            let Ruler { low, inverse_width, n } = self.ruler[axis];
-            let last = (n - 1) as f64;
-            let (x, place, fraction) = (&positions[axis], &mut place[axis], &mut fraction[axis]);
-            for lane in 0..LANES {
-                let along = (x[lane] - low) * inverse_width;
-                let floor = floor(along, last);
-                let rest = (along - floor) as f32;
-                let rest = if rest > 0.0 { rest } else { 0.0 };
-                fraction[lane] = if rest < 1.0 { rest } else { 1.0 };
-                place[lane] = low_bits(floor);
-            }
-        }
-        for axis in 0..D {
-            number(place, &self.face_strides[axis], index);
-            let (source, step) = (&self.faces[axis][..], self.face_strides[axis][axis]);
-            let [low, high] = &mut faces[axis];
-            for lane in 0..LANES {
-                let face = index[lane] as usize;
-                low[lane] = source[face];
-                high[lane] = source[face + step];
-            }
-        }
-        number(place, &self.corner_strides, index);
-        let source = &self.corners[..];
-        for row in 0..1_usize << (D - 1) {
-            let mut offset = 0;
-            for axis in 0..D - 1 {
-                offset += (row >> (D - 2 - axis) & 1) * self.corner_strides[axis];
-            }
-            for lane in 0..LANES {
-                let first = index[lane] as usize + offset;
-                let (low, high) = (&source[first], &source[first + 1]);
-                for axis in 0..D {
-                    corners[2 * row][axis][lane] = low[axis];
-                    corners[2 * row + 1][axis][lane] = high[axis];
-                }
-            }
-        }
+        sum / count
     }
 }
 
@@ -183,23 +200,7 @@ fn number<const D: usize>(place: &[[i32; LANES]; D], strides: &[usize; D], index
 }
 
 /// Added to a number of moderate size it leaves the nearest whole number in the low bits.
-const SHIFT: f64 = 4_503_599_627_370_496.0;
-
-/// A whole number below 2³¹ as an integer; conversions do not vectorise everywhere.
-#[inline(always)]
-fn low_bits(whole: f64) -> i32 {
-    (whole + SHIFT).to_bits() as i32
-}
-
-/// Largest whole number not above `x`, within `0 … last`.
-#[inline(always)]
-fn floor(x: f64, last: f64) -> f64 {
-    let x = if x > 0.0 { x } else { 0.0 };
-    let x = if x < last + 0.5 { x } else { last };
-    let nearest = (x + SHIFT) - SHIFT;
-    let floor = if nearest > x { nearest - 1.0 } else { nearest };
-    if floor < last { floor } else { last }
-}
+const SHIFT: f64 = 6_755_399_441_055_744.0;
 
 fn strides<const D: usize>(n: [usize; D]) -> [usize; D] {
     let mut strides = [1; D];
@@ -225,10 +226,10 @@ struct Around<const D: usize> {
     place: [[i32; LANES]; D],
     fraction: [Narrow; D],
     index: [i32; LANES],
-    /// Per axis the lower and the upper face.
-    faces: [[Narrow; 2]; D],
-    /// Per corner (last axis fastest) and component.
-    corners: [[Narrow; D]; CORNERS],
+    /// The records of the cells, four numbers at a time.
+    quads: [Narrow; 4 * MOST_QUADS],
+    /// One component at the corners, while it is worked out.
+    values: [Narrow; CORNERS],
 }
 
 impl<const D: usize> Around<D> {
@@ -238,12 +239,25 @@ impl<const D: usize> Around<D> {
             place: [[0; LANES]; D],
             fraction: [[0.0; LANES]; D],
             index: [0; LANES],
-            faces: [[[0.0; LANES]; 2]; D],
-            corners: [[[0.0; LANES]; D]; CORNERS],
+            quads: [[0.0; LANES]; 4 * MOST_QUADS],
+            values: [[0.0; LANES]; CORNERS],
         }
     }
 
-    /// One component between the corners, and its gradient. The corners are used up.
+    /// Number `k` of the record of a lane.
+    #[inline(always)]
+    fn at(&self, k: usize, lane: usize) -> f32 {
+        self.quads[k][lane]
+    }
+
+    /// Velocity between the two faces of an axis.
+    #[inline(always)]
+    fn between_faces(&self, axis: usize, lane: usize) -> f32 {
+        let (low, high) = (self.at(2 * axis, lane), self.at(2 * axis + 1, lane));
+        low + self.fraction[axis][lane] * (high - low)
+    }
+
+    /// One component between the corners, left in `values[0]`, and its gradient in `slopes[axis][0]`.
     ///
     /// - Equation: multilinear interpolation, one axis after the other from the last.
     /// - Symbols: fractions of the cell along each axis; gradients over `1 / inverse_width`.
@@ -257,9 +271,18 @@ impl<const D: usize> Around<D> {
         inverse_width: &[f32; D],
         slopes: &mut [[Narrow; CORNERS / 2]; D],
     ) {
-        for axis in (0..D).rev() {
+        let last = D - 1;
+        for k in 0..1_usize << last {
+            let first = 2 * D + 2 * k * D + component;
+            for lane in 0..LANES {
+                let (low, high) = (self.at(first, lane), self.at(first + D, lane));
+                let step = high - low;
+                slopes[last][k][lane] = step * inverse_width[last];
+                self.values[k][lane] = low + self.fraction[last][lane] * step;
+            }
+        }
+        for axis in (0..last).rev() {
             let u = &self.fraction[axis];
-            let scale = inverse_width[axis];
             for k in 0..1_usize << axis {
                 for other in axis + 1..D {
                     for lane in 0..LANES {
@@ -268,11 +291,10 @@ impl<const D: usize> Around<D> {
                     }
                 }
                 for lane in 0..LANES {
-                    let (low, high) =
-                        (self.corners[2 * k][component][lane], self.corners[2 * k + 1][component][lane]);
+                    let (low, high) = (self.values[2 * k][lane], self.values[2 * k + 1][lane]);
                     let step = high - low;
-                    slopes[axis][k][lane] = step * scale;
-                    self.corners[k][component][lane] = low + u[lane] * step;
+                    slopes[axis][k][lane] = step * inverse_width[axis];
+                    self.values[k][lane] = low + u[lane] * step;
                 }
             }
         }
@@ -316,18 +338,18 @@ impl<const D: usize> Medium<D> for CellMedium<D> {
         }
         for component in 0..D {
             around.between(component, &inverse_width, &mut slopes[component]);
+            look.direction[component] = around.values[0];
         }
         let mut speed = [0.0_f32; LANES];
         for lane in 0..LANES {
             let mut square = f32::MIN_POSITIVE;
             for i in 0..D {
-                let v = around.corners[0][i][lane];
-                square += v * v;
+                square += look.direction[i][lane] * look.direction[i][lane];
             }
             speed[lane] = square.sqrt();
             let inverse = 1.0 / speed[lane];
             for i in 0..D {
-                look.direction[i][lane] = around.corners[0][i][lane] * inverse;
+                look.direction[i][lane] *= inverse;
             }
             look.along[lane] = (2.0 * mobility * (along * speed[lane] + molecular)).sqrt();
             look.across[lane] = (2.0 * mobility * (across * speed[lane] + molecular)).sqrt();
@@ -351,8 +373,7 @@ impl<const D: usize> Medium<D> for CellMedium<D> {
                     turning += look.direction[j][lane] * slopes[i][j][0][lane];
                 }
                 let spreading = across * speed_slope[i][lane] + (along - across) * turning;
-                let (low, high) = (around.faces[i][0][lane], around.faces[i][1][lane]);
-                let flow = low + around.fraction[i][lane] * (high - low);
+                let flow = around.between_faces(i, lane);
                 look.speed[i][lane] = flow * mobility;
                 look.drift[i][lane] = (flow + spreading) * mobility;
             }
@@ -428,7 +449,6 @@ impl<const D: usize> Medium<D> for CellMedium<D> {
     fn velocity(&self, place: [f64; D], axis: usize) -> f64 {
         let mut around = Around::new();
         self.gather(&place.map(|x| [x; LANES]), &mut around);
-        let [low, high] = &around.faces[axis];
-        f64::from(low[0] + around.fraction[axis][0] * (high[0] - low[0]))
+        f64::from(around.between_faces(axis, 0))
     }
 }
