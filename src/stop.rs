@@ -4,7 +4,7 @@
 //! May use the scenario, the plan and the engine. It deliberately runs nothing and shows nothing.
 
 use crate::chemistry::Why;
-use crate::diagnostic::codes::{F103, R101, R102, R103, R104, R106, R107, R108};
+use crate::diagnostic::codes::{F103, R101, R102, R103, R104, R106, R107};
 use crate::diagnostic::{Code, Diagnostic, precise};
 use crate::engine::RunError;
 use crate::plan::chemistry::Integrator;
@@ -34,9 +34,8 @@ pub fn code(error: &RunError) -> Code {
         RunError::Chemistry { why: Why::TooManySteps { .. }, .. } => R106,
         RunError::Chemistry { .. } => R107,
         RunError::TooManySubSteps { .. } => R106,
-        RunError::Flow(_) => R108,
         RunError::OutOfMemory { .. } | RunError::Threads(_) => R103,
-        RunError::Plan(_) => R104,
+        RunError::Plan(_) | RunError::Flow(_) => R104,
         RunError::Sink(_) => F103,
     }
 }

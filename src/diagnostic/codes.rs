@@ -74,7 +74,6 @@ codes! {
     R105 "a result cannot be compared or measured",
     R106 "a step needs more sub-steps than it may take",
     R107 "reactions cannot be taken over a step",
-    R108 "the flow has no solution",
     P001 "the command line sets a parameter that the scene does not have",
     P002 "a parameter lies outside of its range",
     D001 "two parameters of a function have one name",
