@@ -32,6 +32,28 @@ fn edited(from: &str, to: &str) -> String {
 }
 
 #[test]
+fn reactions_are_timed_where_they_are_fast() {
+    let scene = "lamella 1
+species A, B
+initial A = 1 mmol/L
+reaction near_the_end: A -> B @ if x > 0.9 m then 4 /d else 0 /d
+domain line x = 0 m .. 1 m
+boundary left, right reflect
+particles fluid 100 ordered
+run to 5 d, step 0.1 d
+output total A at t = 5 d
+";
+    let compiled = compile(scene);
+    let limit = |name: &str| {
+        let found = compiled.limits.iter().find(|limit| limit.name.starts_with(name));
+        found.map(|limit| limit.value).unwrap_or_else(|| panic!("no {name} among {:#?}", compiled.limits))
+    };
+    let time = limit("shortest time of reaction `near_the_end`");
+    assert!((time / (86_400.0 / 4.0) - 1.0).abs() < 1e-12, "{time}");
+    assert!((limit("fastest reaction per step") / 0.4 - 1.0).abs() < 1e-12);
+}
+
+#[test]
 fn units_layout_comments_and_order_do_not_change_the_hash() {
     let hash = compile(COLUMN).hash;
     let in_metres = COLUMN

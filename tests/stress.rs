@@ -70,9 +70,9 @@ fn every_scene_runs_under_stress_or_says_at_a_line_why_not() {
         let checked =
             lamella::check(Sources::single(&*name, text), &Settings::default(), &Options::default());
         let mut scenario = checked.scenario.unwrap_or_else(|| panic!("{name} is wrong"));
-        let compiled = checked.compiled.unwrap_or_else(|| panic!("{name} is refused"));
+        assert!(checked.compiled.is_some(), "{name} is refused");
         shorten(&mut scenario);
-        for trial in Trial::all(&compiled.plan, &Knob::ALL, 12, 6) {
+        for trial in Trial::all(&scenario, &Knob::ALL, 12, 6) {
             let verdict = trial.run(&scenario, &Options::default(), &bounds);
             n_trials += 1;
             n_finished += u32::from(verdict.fate == Fate::Finished);

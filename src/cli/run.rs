@@ -88,8 +88,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
         name: scene_name(&arguments.file),
         folder: arguments.folder(),
         n_threads: arguments.n_threads(),
-        wants_figure: arguments.plot,
-        wants_error_bars: arguments.error,
+        wants: Wants { figure: arguments.plot, error_bars: arguments.error },
         settings: arguments.set.clone(),
         file: Some(arguments.file.clone()),
         begin,
@@ -104,6 +103,7 @@ pub(crate) fn run_sources(
     settings: &Settings,
     folder: &Path,
     n_threads: usize,
+    wants: Wants,
     terminal: &Terminal,
 ) -> CommandResult {
     let begin = Instant::now();
@@ -111,17 +111,15 @@ pub(crate) fn run_sources(
     let checked = lamella::check(sources, settings, &options);
     let folder = folder.to_path_buf();
     let name = name.to_owned();
-    let asked = Asked {
-        name,
-        folder,
-        n_threads,
-        wants_figure: true,
-        wants_error_bars: false,
-        settings: settings.set.clone(),
-        file: None,
-        begin,
-    };
+    let asked = Asked { name, folder, n_threads, wants, settings: settings.set.clone(), file: None, begin };
     run_checked(checked, asked, terminal)
+}
+
+/// What a run makes besides its tables.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Wants {
+    pub(crate) figure: bool,
+    pub(crate) error_bars: bool,
 }
 
 /// What a run is asked for besides its scene.
@@ -129,8 +127,7 @@ struct Asked {
     name: String,
     folder: PathBuf,
     n_threads: usize,
-    wants_figure: bool,
-    wants_error_bars: bool,
+    wants: Wants,
     /// `--set name=value`
     settings: Vec<(String, String)>,
     /// Absent if it is none of the user's.
@@ -157,8 +154,7 @@ fn run_checked(mut checked: Checked, asked: Asked, terminal: &Terminal) -> Comma
         swept: record::swept(&scenario),
         folder: asked.folder,
         n_threads: asked.n_threads,
-        wants_figure: asked.wants_figure,
-        wants_error_bars: asked.wants_error_bars,
+        wants: asked.wants,
         settings: asked.settings,
         facts: facts::facts(asked.file.as_deref(), asked.n_threads),
         compile_wall,
@@ -195,8 +191,7 @@ struct Job {
     swept: Vec<Swept>,
     folder: PathBuf,
     n_threads: usize,
-    wants_figure: bool,
-    wants_error_bars: bool,
+    wants: Wants,
     settings: Vec<(String, String)>,
     /// Of machine, compiler and repository.
     facts: Vec<(String, String)>,
@@ -219,7 +214,7 @@ impl Job {
         let found = self.simulate(&mut writer, terminal, interrupt)?;
         writer.error_bars(found.error_bars.as_ref().map(|bars| bars.rows.clone()).unwrap_or_default());
         let begin = Instant::now();
-        let figure = self.wants_figure.then(|| {
+        let figure = self.wants.figure.then(|| {
             report::figure(&self.compiled.plan, &self.record, &found.snapshots, &found.evaluated.curves)
         });
         let errors = report::error_rows(&self.compiled.plan, self.record.n_axes, &found.evaluated.errors);
@@ -255,7 +250,7 @@ impl Job {
     /// Tells where the tables come from.
     fn write_crate(&self, started: i64, written: &Written) -> Result<(), Stopped> {
         let version = self.record.version.clone();
-        let figure = self.wants_figure.then(|| FIGURE.to_owned());
+        let figure = self.wants.figure.then(|| FIGURE.to_owned());
         let provenance = Provenance {
             scene_name: &self.record.scene_name,
             title: self.record.title.as_deref(),
@@ -311,7 +306,7 @@ impl Job {
             let (n_axes, followed) = (self.record.n_axes, (terminal, &watch));
             ErrorBars::find(plan, &self.scenario, n_axes, &snapshots, self.n_threads, followed)
         };
-        let error_bars = self.wants_error_bars.then(find_bars).transpose()?;
+        let error_bars = self.wants.error_bars.then(find_bars).transpose()?;
         Ok(Found { outcome, snapshots, evaluated, error_bars, started })
     }
 

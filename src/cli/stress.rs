@@ -87,7 +87,8 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
         [] => Knob::ALL.to_vec(),
         chosen => chosen.iter().map(|&name| name.into()).collect(),
     };
-    let trials = Trial::all(&compiled.plan, &knobs, arguments.decades, arguments.every);
+    refuse_absent(&arguments.knobs, scenario)?;
+    let trials = Trial::all(scenario, &knobs, arguments.decades, arguments.every);
     terminal.remark(&format!("{} trials of at most {} each", trials.len(), duration(arguments.seconds)));
     let begin = Instant::now();
     let (verdicts, is_cancelled) = judge(arguments, scenario, &trials, &interrupt);
@@ -102,6 +103,19 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
     }
     terminal.product(&text(&rows, begin.elapsed().as_secs_f64(), terminal)?)?;
     Ok(if is_cancelled { Exit::Interrupted } else { Exit::Done })
+}
+
+/// A knob that was asked for and that the scene does not have would be a test of nothing.
+fn refuse_absent(asked: &[KnobName], scenario: &Scenario) -> Result<(), Stopped> {
+    let present = Knob::of(scenario);
+    let Some(absent) = asked.iter().map(|&name| Knob::from(name)).find(|knob| !present.contains(knob)) else {
+        return Ok(());
+    };
+    let names: Vec<String> = present.iter().map(|knob| format!("`{}`", knob.name())).collect();
+    let message = Diagnostic::error(codes::F128, format!("the scene has no `{}` to turn", absent.name()))
+        .found(format!("`--knobs {}`", absent.name()))
+        .expected(format!("some of {}", names.join(", ")));
+    Err(Stopped::new(Exit::SceneWrong, message))
 }
 
 /// One trial after the other, as each uses all cores.

@@ -19,6 +19,11 @@ impl Terminal {
         Self { format: global.message_format, colour, is_quiet: global.quiet }
     }
 
+    /// The same, but only for what stops a command.
+    pub(crate) fn hushed(&self) -> Self {
+        Self { is_quiet: true, ..*self }
+    }
+
     pub(crate) fn is_json(&self) -> bool {
         self.format == MessageFormat::Json
     }

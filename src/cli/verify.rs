@@ -1,5 +1,6 @@
 //! `lamella verify` and `lamella repro`: the same again, and the same bytes.
 
+use super::run::Wants;
 use super::sweep::{failed, pool};
 use super::sweep_folder::{Which, open, point_of};
 use super::why::{check_replicate, is_sweep};
@@ -9,6 +10,9 @@ use lamella::report::SWEEP_FILE;
 use lamella::scenario::Settings;
 use lamella::source::Sources;
 use std::path::{Path, PathBuf};
+
+/// Folder of the table that only `run --error` writes.
+const ERROR_BARS: &str = "error_bars";
 
 /// Run results again and compare them, byte by byte
 #[derive(clap::Args)]
@@ -62,7 +66,10 @@ fn verify_run(folder: &Path, threads: usize, terminal: &Terminal) -> CommandResu
         .prefix(".lamella-verify-")
         .tempdir_in(folder)
         .map_err(|error| failed(&format!("cannot make a folder in {}: {error}", folder.display())))?;
-    let exit = run_command::run_sources(sources, &name, &settings, again.path(), threads, terminal)?;
+    // Error bars are data: they are found again where there are some. A figure is none.
+    let wants = Wants { figure: false, error_bars: folder.join(ERROR_BARS).is_dir() };
+    let hushed = terminal.hushed();
+    let exit = run_command::run_sources(sources, &name, &settings, again.path(), threads, wants, &hushed)?;
     if exit != Exit::Done {
         return Ok(exit);
     }
@@ -148,5 +155,6 @@ pub(crate) fn repro(arguments: &ReproArguments, terminal: &Terminal) -> CommandR
     for (_, file) in texts {
         sources.add(file.name.clone(), file.text.clone());
     }
-    run_command::run_sources(sources, &loaded.scene_name, &settings, &out, threads, terminal)
+    let wants = Wants { figure: true, error_bars: false };
+    run_command::run_sources(sources, &loaded.scene_name, &settings, &out, threads, wants, terminal)
 }

@@ -67,6 +67,7 @@ codes! {
     F125 "a folder holds results of another kind",
     F126 "a folder holds another sweep",
     F127 "a sweep has no point",
+    F128 "a scene has nothing to turn under this name",
     R101 "the run was interrupted",
     R102 "a value of the run is no longer right",
     R103 "the machine cannot give what the run needs",

@@ -56,6 +56,11 @@ pub fn compile(scenario: &Scenario, options: &Options) -> (Option<Compiled>, Vec
     compile_from(scenario, options, None)
 }
 
+/// The plan of a scenario before anything is left out of it or folded.
+pub fn before_passes(scenario: &Scenario) -> Option<Plan> {
+    lower::lower(scenario).ok().map(|(plan, ..)| plan)
+}
+
 /// A change of a plan.
 pub type Edit<'e> = &'e dyn Fn(&mut Plan);
 

@@ -21,8 +21,9 @@ pub(super) struct Expected {
 /// Solving Ordinary Differential Equations I, 2nd ed., Springer, II.4 and IV.2 of the second volume.
 const STABLE: f64 = 3.3;
 
-/// Sub-steps for each time that a value changes by the factor e, at a tolerance of 1e-4: measured with the
-/// networks of `make bench` and of `experiments/stiff`. They grow with the order of the method.
+/// Sub-steps for each time that a value changes by the factor e, at a tolerance of 1e-4: guesses between what
+/// the networks of `make bench` and of `experiments/stiff` take, which differ by factors of two and more. They
+/// grow with the order of the method.
 const EXPLICIT_PER_FOLDING: f64 = 0.8;
 const IMPLICIT_PER_FOLDING: f64 = 1.2;
 

@@ -38,10 +38,10 @@ pub(super) fn check(
     };
     for (reaction, rate) in kinetics.reactions.iter().zip(&scales.rates).filter(|(_, rate)| **rate > 0.0) {
         limits.push(Limit {
-            name: format!("time of reaction `{}` in s", reaction.name),
-            formula: "1 / |dr/dc . nu|, the shortest met",
+            name: format!("shortest time of reaction `{}` in s", reaction.name),
+            formula: "1 / |dr/dc . nu|",
             value: 1.0 / rate,
-            advice: "any: sub-steps are as short as the tolerance asks",
+            advice: "no limit to the step: sub-steps follow it",
         });
     }
     let rate = scales.fastest_rate();
@@ -55,7 +55,7 @@ pub(super) fn check(
         name: "stiffness".into(),
         formula: "fastest reaction / slowest reaction",
         value: scales.stiffness(),
-        advice: "any: implicit integrators do not mind",
+        advice: "no limit: implicit integrators take any",
     });
     sub_steps(plan, scales, limits);
     damkohler(plan, rate, limits);

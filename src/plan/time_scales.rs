@@ -11,8 +11,10 @@ use std::collections::BTreeMap;
 
 /// Points along each axis at which initial values are taken.
 const POINTS: usize = 17;
-/// States from which courses start.
+/// States of the beginning from which courses start.
 const MAX_STARTS: usize = 6;
+/// Further ones at the places where reactions are fastest.
+const MAX_PLACES: usize = 4;
 /// Each implicit step of a course is this much longer than the one before.
 const GROWTH: f64 = 3.0;
 /// The first one, against the fastest reaction.
@@ -102,17 +104,42 @@ impl Network<'_> {
         let n = self.plan.components.len();
         let column = |k: usize| samples.iter().map(move |(_, values)| values[k]);
         let mean = (0..n).map(|k| column(k).sum::<f64>() / samples.len() as f64).collect();
-        let largest = (0..n).map(|k| column(k).fold(0.0, f64::max)).collect();
+        let largest: Vec<f64> = (0..n).map(|k| column(k).fold(0.0, f64::max)).collect();
         let middle = samples[samples.len() / 2].0;
-        let mut states = vec![(middle, largest), (middle, mean)];
+        let mut states = vec![(middle, mean)];
+        for place in self.fastest_places(middle, &samples, &largest) {
+            states.push((place, largest.clone()));
+        }
         for k in 0..n {
             let place = (0..samples.len()).max_by(|&a, &b| samples[a].1[k].total_cmp(&samples[b].1[k]));
             let Some(place) = place else { continue };
-            if states.len() < MAX_STARTS && !states.iter().any(|(_, values)| *values == samples[place].1) {
+            if states.len() < MAX_STARTS + MAX_PLACES
+                && !states.iter().any(|(_, values)| *values == samples[place].1)
+            {
                 states.push(samples[place].clone());
             }
         }
         states
+    }
+
+    /// The middle, and where a reaction is faster than there: laws may depend on the place.
+    fn fastest_places(&self, middle: [f64; 3], samples: &[State], state: &[f64]) -> Vec<[f64; 3]> {
+        let rates_at = |place: [f64; 3]| -> Vec<f64> {
+            self.rates(place, 0.0, state).0.into_iter().map(f64::abs).collect()
+        };
+        let at: Vec<_> = samples.iter().map(|(place, _)| (*place, rates_at(*place))).collect();
+        let mut places = vec![middle];
+        let mut best = rates_at(middle);
+        for k in 0..best.len() {
+            let fastest = at.iter().max_by(|a, b| a.1[k].total_cmp(&b.1[k]));
+            let Some((place, rates)) = fastest.filter(|(_, rates)| rates[k] > best[k]) else { continue };
+            if places.len() > MAX_PLACES {
+                break;
+            }
+            places.push(*place);
+            best.iter_mut().zip(rates).for_each(|(best, rate)| *best = best.max(*rate));
+        }
+        places
     }
 
     /// Concentrations of all species.
@@ -192,8 +219,7 @@ impl Network<'_> {
             let Some(change) = implicit(&j, &f, h) else { return };
             let share = ((span - t) / h).clamp(0.0, 1.0);
             way.relaxations += share * h * fastest;
-            // What grows from nothing at a steady rate has no rate that changes: it is followed at no cost.
-            way.foldings += share * self.folding(&mut y, &change).min(h * fastest);
+            way.foldings += share * self.folding(&mut y, &change, h * fastest);
             t += h;
             step = Some(h * GROWTH);
         }
@@ -202,13 +228,17 @@ impl Network<'_> {
 
 impl Network<'_> {
     /// Changes the values; the largest change of a logarithm, above the floors.
-    fn folding(&self, y: &mut [f64], change: &[f64]) -> f64 {
+    ///
+    /// What grows from nothing at a steady rate has no rate that changes, and is followed at no cost: it counts
+    /// for no more than `most_grown`. What runs out at a steady rate ends, which has to be found.
+    fn folding(&self, y: &mut [f64], change: &[f64], most_grown: f64) -> f64 {
         let floors = self.plan.chemistry.as_ref().map_or(&[][..], |chemistry| &chemistry.floors);
         let mut most = 0.0_f64;
         for (k, (y, change)) in y.iter_mut().zip(change).enumerate() {
             let new = (*y + change).max(0.0);
             let floor = floors.get(k).copied().unwrap_or(0.0).max(f64::MIN_POSITIVE);
-            most = most.max(ln((new + floor) / (*y + floor)).abs());
+            let change = ln((new + floor) / (*y + floor));
+            most = most.max((-change).max(change.min(most_grown)));
             *y = new;
         }
         most

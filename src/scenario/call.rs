@@ -5,8 +5,8 @@ use super::expression::{Expr, Type};
 use super::results::norm_of;
 use super::scope::{BUILT_IN_FUNCTIONS, Locals, Origin};
 use crate::catalog::rate;
-use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{D005, D006, D007, D009, U102, U104};
+use crate::diagnostic::{Diagnostic, precise};
 use crate::maths::operator::{Binary, Unary};
 use crate::source::Span;
 use crate::syntax::tree;
@@ -105,6 +105,7 @@ impl<'a> Checker<'a> {
                 return None;
             }
         };
+        self.are_within_bounds(item, &values)?;
         let kind = Type::Number(dimension);
         let built = item.follow(
             &values,
@@ -113,6 +114,17 @@ impl<'a> Checker<'a> {
             |operator, a, b| Expr::binary(operator, a, b, kind, span),
         )?;
         Some(Expr { span, kind, ..built })
+    }
+
+    /// Whether constants are what the arguments of a function may be.
+    fn are_within_bounds(&mut self, item: &rate::Item, values: &[Expr]) -> Option<()> {
+        for (argument, bound) in item.bounds {
+            let Some(value) = values[*argument].value() else { continue };
+            let what = format!("`{}` of `{}`", item.arguments[*argument].0, item.name);
+            let found = format!("{} (SI)", precise(value));
+            self.require(bound.allows(value), &what, found, bound.words(), values[*argument].span)?;
+        }
+        Some(())
     }
 
     fn user_function(

@@ -102,7 +102,7 @@ fn assignments<'a>(
 /// The species that a name means, or a message.
 pub(super) fn species_index(checker: &mut Checker<'_>, name: &tree::Name) -> Option<usize> {
     let Some(entry) = checker.scope.get_mut(&name.value) else {
-        checker.scope.note_undefined(&name.value, name.span);
+        checker.scope.note_undefined_species(&name.value, name.span);
         return None;
     };
     entry.n_uses += 1;

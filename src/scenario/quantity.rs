@@ -2,6 +2,7 @@
 
 use super::check::Checker;
 use super::expression::{Expr, Type};
+use super::scope::{Entry, Origin};
 use crate::diagnostic::codes::{U105, U106, U107};
 use crate::diagnostic::{Diagnostic, did_you_mean};
 use crate::source::Span;
@@ -49,7 +50,14 @@ impl Checker<'_> {
     /// `0.8 /d` is per day even where the scene has a `d`: say so.
     fn note_unit_that_is_a_name(&mut self, number: &tree::Number, span: Span) {
         let Some(name) = number.unit.as_ref().and_then(|unit| unit.value.strip_prefix('/')) else { return };
-        let Some(entry) = self.scope.get(name) else { return };
+        // What has no value cannot have been meant.
+        let is_value = |entry: &&Entry| {
+            matches!(
+                entry.origin,
+                Origin::Let(_) | Origin::Param(_) | Origin::Species(_) | Origin::Measure(_)
+            )
+        };
+        let Some(entry) = self.scope.get(name).filter(is_value) else { return };
         let (origin, defined) = (entry.origin.describe(), entry.span);
         self.diagnostics.push(
             Diagnostic::remark(
@@ -86,7 +94,13 @@ impl Checker<'_> {
             UnitError::Malformed { start, end } => Diagnostic::error(U105, "this is not a unit")
                 .at(sub(*start, *end), "cannot be read as a unit")
                 .found("something else")
-                .expected("symbols joined by `/` or `·`, powers as `m^2`"),
+                .expected("symbols joined by `/` or `·`, powers as `m^2`, `mol^0.5`"),
+            UnitError::NoSixtieth { start, end } => {
+                Diagnostic::error(U105, "this power of a unit cannot be kept")
+                    .at(sub(*start, *end), "no number of sixtieths")
+                    .found("another fraction")
+                    .expected("a power such as 2, 0.5, 0.25, 0.2 or 0.1")
+            }
             UnitError::ExponentTooLarge { start, end } => {
                 Diagnostic::error(U105, "the power of this unit is too large")
                     .at(sub(*start, *end), "beyond 9")

@@ -278,15 +278,8 @@ fn report_constant<'a>(
     let help = match constant_of_order(own, order) {
         Some(dimension) => {
             expected.push(dimension.describe());
-            if order.fract() == 0.0 {
-                let unit = unit_of_order(own, order);
-                format!("a rate constant of order {} has a unit such as `{unit}`", precise(order))
-            } else {
-                let unit = if own == Dimension::MASS_CONCENTRATION { "mg/L" } else { "mol/L" };
-                let power = precise(1.0 - order);
-                let order = precise(order);
-                format!("write one of order {order} as a product, `1 /s * (1 {unit})^{power}`")
-            }
+            let unit = unit_of_order(own, order);
+            format!("a rate constant of order {} has a unit such as `{unit}`", precise(order))
         }
         None => format!("an order of {} has no rate constant with a unit: write the law", precise(order)),
     };

@@ -71,6 +71,8 @@ pub(super) struct Scope<'a> {
     doubtful: BTreeSet<String>,
     /// Undefined names and the places that use them; reported once each.
     undefined: BTreeMap<String, BTreeSet<Span>>,
+    /// Those of them that stand where only a species can.
+    wanted_species: BTreeSet<String>,
     /// For some of these the parameter of a function that may be what is misspelt.
     suspects: BTreeMap<String, (String, Span)>,
 }
@@ -147,6 +149,17 @@ impl<'a> Scope<'a> {
         self.undefined.entry(name.to_owned()).or_default().insert(span);
     }
 
+    /// The same where only a species can stand: nothing else is offered for it.
+    pub(super) fn note_undefined_species(&mut self, name: &str, span: Span) {
+        self.wanted_species.insert(name.to_owned());
+        self.note_undefined(name, span);
+    }
+
+    /// Whether an entry can be what is meant by an undefined name.
+    fn fits(&self, name: &str, entry: &Entry<'a>) -> bool {
+        matches!(entry.origin, Origin::Species(_)) || !self.wanted_species.contains(name)
+    }
+
     /// Notes a parameter that nothing uses and that an undefined name may mean.
     pub(super) fn suspect(&mut self, name: &str, parameter: &tree::Name) {
         self.suspects.insert(name.to_owned(), (parameter.value.clone(), parameter.span));
@@ -199,20 +212,28 @@ impl<'a> Scope<'a> {
 
     /// The only definition that nothing uses and that differs from a name by a slip.
     fn only_unused(&self, name: &str) -> Option<(&str, &Entry<'a>)> {
-        let mut unused =
+        let unused =
             self.entries.iter().filter(|(written, entry)| entry.n_uses == 0 && is_slip(name, written));
+        let mut unused = unused.filter(|(_, entry)| self.fits(name, entry));
         let (written, entry) = unused.next()?;
         unused.next().is_none().then_some((written, entry))
     }
 
     fn undefined_use(&self, name: &str, span: Span, axes: &[String]) -> Diagnostic {
+        let is_species = self.wanted_species.contains(name);
+        let (what, expected) = match is_species {
+            true => ("no such species", "a species of the scene"),
+            false => ("no such name", "a name that the scene defines"),
+        };
         let mut message = Diagnostic::error(D004, format!("`{name}` is not defined"))
-            .at(span, "no such name")
+            .at(span, what)
             .found(format!("`{name}`"))
-            .expected("a name that the scene defines");
-        let names = self.entries.keys().map(String::as_str);
+            .expected(expected);
+        let names =
+            self.entries.iter().filter(|(_, entry)| self.fits(name, entry)).map(|(own, _)| own.as_str());
         let functions = BUILT_IN_FUNCTIONS.iter().copied().chain(rate::ALL.iter().map(|item| item.name));
-        let candidates = names.chain(functions).chain(axes.iter().map(String::as_str));
+        let others = functions.chain(axes.iter().map(String::as_str)).filter(|_| !is_species);
+        let candidates = names.chain(others);
         let parameter = self.suspects.get(name).map(|(written, span)| (written.as_str(), *span));
         let unused = || self.only_unused(name).map(|(written, entry)| (written, entry.span));
         if let Some((written, place)) = parameter.or_else(unused) {

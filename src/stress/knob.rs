@@ -4,8 +4,10 @@
 //! is refused is refused at the lines as they stand.
 
 use crate::plan::Plan;
+use crate::plan::compile::before_passes;
 use crate::plan::tape::{Binary, Operation, Register};
 use crate::plan::{Component, Time, ZoneRate, chemistry};
+use crate::scenario::Scenario;
 
 /// A quantity of a scene that is multiplied.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -50,8 +52,15 @@ impl Knob {
         }
     }
 
+    /// All that a scene has. What a pass folds into constants is turned before it is folded, so the plan is
+    /// looked at as it was lowered.
+    pub fn of(scenario: &Scenario) -> Vec<Self> {
+        let Some(plan) = before_passes(scenario) else { return Vec::new() };
+        Self::ALL.into_iter().filter(|knob| knob.is_in(&plan)).collect()
+    }
+
     /// Whether the plan has anything to turn.
-    pub fn is_in(self, plan: &Plan) -> bool {
+    fn is_in(self, plan: &Plan) -> bool {
         let kinetics = plan.chemistry.as_ref().and_then(|chemistry| chemistry.kinetics.as_ref());
         let equilibrium = plan.chemistry.as_ref().and_then(|chemistry| chemistry.equilibrium.as_ref());
         let is_moving = plan.walk.drift.iter().chain(&plan.walk.spread).any(|entry| *entry != 0.0);

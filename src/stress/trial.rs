@@ -90,12 +90,12 @@ pub struct Verdict {
 
 impl Trial {
     /// All trials of a scene: each knob that it has by `-decades ..= decades`, in steps of `every`.
-    pub fn all(plan: &Plan, knobs: &[Knob], decades: i32, every: i32) -> Vec<Self> {
+    pub fn all(scenario: &Scenario, knobs: &[Knob], decades: i32, every: i32) -> Vec<Self> {
         let of_knob = |&knob: &Knob| {
             let n = decades / every.max(1);
             (-n..=n).map(move |k| Self { knob, decades: k * every.max(1) })
         };
-        knobs.iter().filter(|knob| knob.is_in(plan)).flat_map(of_knob).collect()
+        Knob::of(scenario).iter().filter(|knob| knobs.contains(knob)).flat_map(of_knob).collect()
     }
 
     /// Runs the trial.

@@ -1,13 +1,18 @@
 //! Dimensions, units and exact conversion of written quantities to SI.
 //!
-//! Owns the table of units; prefixes are computed. May use nothing else of the crate.
+//! Owns the table of units; prefixes are computed. May use `maths`, for roots of units.
 //! It deliberately does not know what a quantity is for.
 
 pub mod dimension;
 mod table;
 
+use crate::maths::scalar;
+
 pub use dimension::Dimension;
 pub use table::{is_unit_symbol, known_symbols};
+
+/// Powers of units are counted in these, as those of dimensions.
+const SIXTIETHS: i32 = dimension::SCALE as i32;
 
 /// A unit as written, such as `mg/L`: its dimension and its exact factor to SI,
 /// `numerator · 10^decimal / denominator`.
@@ -26,8 +31,10 @@ pub struct Unit {
 pub enum UnitError {
     /// A symbol that the table does not know, with its byte range in the text.
     UnknownSymbol { symbol: String, start: usize, end: usize },
-    /// Not of the form `symbol`, `symbol^n`, joined by `/`, `·` or `.`.
+    /// Not of the form `symbol`, `symbol^n`, `symbol^0.5`, joined by `/`, `·` or `.`.
     Malformed { start: usize, end: usize },
+    /// A power that is no number of sixtieths.
+    NoSixtieth { start: usize, end: usize },
     /// An exponent beyond ±9.
     ExponentTooLarge { start: usize, end: usize },
 }
@@ -38,6 +45,8 @@ impl Unit {
     /// Parses `m`, `cm^2/s`, `/d`, `kg·m/s^2`, `%`.
     pub fn parse(text: &str) -> Result<Unit, UnitError> {
         let mut unit = Unit::ONE;
+        // Powers of ten in sixtieths: those of a whole unit may add up to a whole one.
+        let mut decimal = 0;
         let mut position = 0;
         let mut sign = 1;
         if let Some(rest) = text.strip_prefix('/') {
@@ -51,8 +60,9 @@ impl Unit {
             if text[symbol_end..].starts_with(|c: char| c == '_' || c.is_ascii_digit()) {
                 return Err(unknown(text, position));
             }
+            decimal += sign * power * factor.decimal;
             unit = unit.times(factor, sign * power);
-            let Some(joint) = text[end..].chars().next() else { return Ok(unit) };
+            let Some(joint) = text[end..].chars().next() else { return Ok(unit.shifted(decimal)) };
             sign = match joint {
                 '/' => -1,
                 '·' | '.' => 1,
@@ -62,13 +72,16 @@ impl Unit {
         }
     }
 
+    /// Times another to a power in sixtieths; the powers of ten are the caller's.
     fn times(self, other: Unit, power: i32) -> Unit {
-        let mut result = Unit {
-            dimension: self.dimension.times(other.dimension.power(power, 1).unwrap_or(Dimension::NONE)),
-            decimal: self.decimal + other.decimal * power,
-            ..self
-        };
-        for _ in 0..power.unsigned_abs() {
+        let dimension = other.dimension.power(power, SIXTIETHS).unwrap_or(Dimension::NONE);
+        let mut result = Unit { dimension: self.dimension.times(dimension), ..self };
+        if power % SIXTIETHS != 0 {
+            let factor = other.numerator / other.denominator;
+            result.numerator *= scalar::pow(factor, f64::from(power) / f64::from(SIXTIETHS));
+            return result;
+        }
+        for _ in 0..(power / SIXTIETHS).unsigned_abs() {
             if power > 0 {
                 result.numerator *= other.numerator;
                 result.denominator *= other.denominator;
@@ -78,6 +91,13 @@ impl Unit {
             }
         }
         result
+    }
+
+    /// Times a power of ten in sixtieths.
+    fn shifted(self, decimal: i32) -> Unit {
+        let rest = decimal.rem_euclid(SIXTIETHS);
+        let root = if rest == 0 { 1.0 } else { scalar::pow(10.0, f64::from(rest) / f64::from(SIXTIETHS)) };
+        Unit { decimal: decimal.div_euclid(SIXTIETHS), numerator: self.numerator * root, ..self }
     }
 
     /// The SI value of written digits in this unit; `None` if it is beyond the range of numbers.
@@ -108,7 +128,7 @@ fn unknown(text: &str, start: usize) -> UnitError {
     UnitError::UnknownSymbol { symbol: rest[..len].to_owned(), start, end: start + len }
 }
 
-/// Reads `symbol` or `symbol^n` at `start`; returns the end of the symbol, the power and the end.
+/// Reads `symbol` or `symbol^n` at `start`; returns the end of the symbol, the power in sixtieths and the end.
 fn read_term(text: &str, start: usize) -> Result<(usize, i32, usize), UnitError> {
     let rest = &text[start..];
     let symbol_len = rest.find(|c: char| !(c.is_alphabetic() || c == '%' || c == 'µ')).unwrap_or(rest.len());
@@ -118,26 +138,41 @@ fn read_term(text: &str, start: usize) -> Result<(usize, i32, usize), UnitError>
         return Err(UnitError::Malformed { start, end });
     }
     let after = &text[symbol_end..];
-    for (mark, power) in [('²', 2), ('³', 3)] {
+    for (mark, power) in [('²', 2 * SIXTIETHS), ('³', 3 * SIXTIETHS)] {
         if after.starts_with(mark) {
             return Ok((symbol_end, power, symbol_end + mark.len_utf8()));
         }
     }
-    let Some(exponent) = after.strip_prefix('^') else { return Ok((symbol_end, 1, symbol_end)) };
-    let digits_len = exponent
-        .char_indices()
-        .find(|&(idx, c)| !(c.is_ascii_digit() || (idx == 0 && c == '-')))
-        .map_or(exponent.len(), |(idx, _)| idx);
+    let Some(exponent) = after.strip_prefix('^') else {
+        return Ok((symbol_end, SIXTIETHS, symbol_end));
+    };
+    let digits_len = power_len(exponent);
     let end = symbol_end + 1 + digits_len;
     let malformed = UnitError::Malformed { start: symbol_end, end };
-    let power: i32 = exponent[..digits_len].parse().map_err(|_| malformed.clone())?;
-    if power == 0 {
+    let power: f64 = exponent[..digits_len].parse().map_err(|_| malformed.clone())?;
+    if power == 0.0 {
         return Err(malformed);
     }
-    if power.abs() > 9 {
+    if power.abs() > 9.0 {
         return Err(UnitError::ExponentTooLarge { start: symbol_end, end });
     }
-    Ok((symbol_end, power, end))
+    let sixtieths = power * f64::from(SIXTIETHS);
+    // A third as a decimal has sixteen digits, as dimensions are shown; a shorter one is refused and not guessed.
+    if (sixtieths - sixtieths.round()).abs() > 1e-9 {
+        return Err(UnitError::NoSixtieth { start: symbol_end, end });
+    }
+    Ok((symbol_end, sixtieths.round() as i32, end))
+}
+
+/// Bytes of `-`, digits and a point that digits follow: a point before a symbol joins two units.
+fn power_len(text: &str) -> usize {
+    let n_digits = |text: &str| text.bytes().take_while(u8::is_ascii_digit).count();
+    let sign = usize::from(text.starts_with('-'));
+    let whole = sign + n_digits(&text[sign..]);
+    match text[whole..].strip_prefix('.').map_or(0, n_digits) {
+        0 => whole,
+        n => whole + 1 + n,
+    }
 }
 
 #[cfg(test)]
@@ -175,6 +210,31 @@ mod tests {
         assert_eq!(si("1", "mmol/m³"), 1e-3);
         assert_eq!(si("1", "µm"), si("1", "um"));
         assert_eq!(si("1", "kg·m/s^2"), si("1", "N"));
+    }
+
+    #[test]
+    fn powers_may_be_fractions() {
+        // mmol^½ L^-½ = (1e-3 mol / 1e-3 m³)^½, and the same for litres alone.
+        assert_eq!(si("1", "mmol^0.5/L^0.5"), 1.0);
+        let near = |found: f64, expected: f64| {
+            assert!((found / expected - 1.0).abs() < 1e-15, "{found} and not {expected}");
+        };
+        near(si("3", "L^0.5"), 3.0 * 1e-3_f64.sqrt());
+        near(si("1", "mol^0.5/L^0.5/s"), 1e3_f64.sqrt());
+        near(si("1", "min^-0.5"), 1.0 / 60.0_f64.sqrt());
+        near(si("1", "ft^0.5/h"), 0.3048_f64.sqrt() / 3600.0);
+        let half = Unit::parse("mol^0.5/m^1.5/s").expect("unit").dimension;
+        assert_eq!(half.unit_text(), "mol^0.5/m^1.5/s");
+        assert_eq!(half.power(2, 1).map(Dimension::unit_text).as_deref(), Some("mol/m^3/s^2"));
+        // A point before a symbol joins, as ever; one before a digit is that of a power.
+        assert_eq!(Unit::parse("kg^1.m"), Unit::parse("kg·m"));
+        assert_eq!(Unit::parse("m^2.0"), Unit::parse("m^2"));
+        // What dimensions are shown as is read again, thirds too.
+        let third = Dimension::LENGTH.power(1, 3).expect("a sixtieth");
+        assert_eq!(Unit::parse(&third.unit_text()).expect("unit").dimension, third);
+        assert_eq!(Unit::parse("m^0.33"), Err(UnitError::NoSixtieth { start: 1, end: 6 }));
+        assert_eq!(Unit::parse("m^9.5"), Err(UnitError::ExponentTooLarge { start: 1, end: 5 }));
+        assert_eq!(Unit::parse("m^-0.0"), Err(UnitError::Malformed { start: 1, end: 6 }));
     }
 
     #[test]

@@ -28,6 +28,14 @@ output particles  A, AB at t = 100 s
 "#;
 
 #[test]
+fn runs_with_error_bars_are_verified_with_them() {
+    let folder = Folder::new();
+    folder.write("a.lam", &SCENE.replace("20_000", "2_000"));
+    folder.lamella(&["run", "a.lam", "--out", "bars", "--error", "--plot"]).exits(0);
+    folder.lamella(&["verify", "bars"]).exits(0);
+}
+
+#[test]
 fn error_bars_leave_all_other_tables_as_they_are() {
     let folder = Folder::new();
     folder.write("a.lam", SCENE);

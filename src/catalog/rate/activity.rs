@@ -1,7 +1,7 @@
 //! Activity coefficients of ions, for rate laws that depend on activities.
 
 use super::Step::{Argument, Binary as Do, Number, Unary as Of};
-use super::{Item, Mismatch, Step, expect};
+use super::{Bound, Item, Mismatch, Step, expect};
 use crate::maths::operator::Binary::{Add, Divide, Multiply, Power, Subtract};
 use crate::maths::operator::Unary::{Negate, Sqrt};
 use crate::units::Dimension;
@@ -25,6 +25,7 @@ pub(super) const DEBYE_HUCKEL: Item = Item {
     name: "debye_huckel",
     arguments: ARGUMENTS,
     dimension,
+    bounds: &[(1, Bound::NotNegative)],
     formula: &[
         Number(10.0),
         Number(A),
@@ -56,6 +57,7 @@ pub(super) const DAVIES: Item = Item {
     name: "davies",
     arguments: ARGUMENTS,
     dimension,
+    bounds: &[(1, Bound::NotNegative)],
     formula: DAVIES_FORMULA,
     equation: "10^(-0.5085 z^2 (sqrt(I) / (1 + sqrt(I)) - 0.3 I)), I in mol/L",
     summary: "activity coefficient of an ion in water of up to about 0.5 mol/L",

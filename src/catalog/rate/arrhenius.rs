@@ -1,7 +1,7 @@
 //! Rate constants at other temperatures.
 
 use super::Step::{Argument, Binary as Do, Number, Unary as Of};
-use super::{Item, Mismatch, expect};
+use super::{Bound, Item, Mismatch, expect};
 use crate::maths::operator::Binary::{Divide, Multiply};
 use crate::maths::operator::Unary::{Exp, Negate};
 use crate::units::Dimension;
@@ -26,6 +26,7 @@ pub(super) const ITEM: Item = Item {
         ("T", "absolute temperature"),
     ],
     dimension,
+    bounds: &[(2, Bound::AboveZero)],
     formula: &[
         Argument(0),
         Argument(1),

@@ -1,7 +1,7 @@
 //! Saturation of a rate with a substrate that inhibits it when there is too much.
 
 use super::Step::{Argument, Binary as Do};
-use super::{Item, ratio_of_alike};
+use super::{Bound, Item, ratio_of_alike};
 use crate::maths::operator::Binary::{Add, Divide, Multiply};
 
 /// Share of the largest rate under inhibition by the substrate itself.
@@ -19,6 +19,7 @@ pub(super) const ITEM: Item = Item {
         ("Ki", "inhibition constant"),
     ],
     dimension: ratio_of_alike,
+    bounds: &[(1, Bound::NotNegative), (2, Bound::AboveZero)],
     formula: &[
         Argument(0),
         Argument(1),

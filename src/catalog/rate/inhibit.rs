@@ -1,7 +1,7 @@
 //! Inhibition of a rate by a solute.
 
 use super::Step::{Argument, Binary as Do};
-use super::{Item, ratio_of_alike};
+use super::{Bound, Item, ratio_of_alike};
 use crate::maths::operator::Binary::{Add, Divide};
 
 /// Share of a rate that an inhibitor leaves.
@@ -15,6 +15,7 @@ pub(super) const ITEM: Item = Item {
     name: "inhibit",
     arguments: &[("c", "concentration of the inhibitor"), ("K", "concentration that halves the rate")],
     dimension: ratio_of_alike,
+    bounds: &[(1, Bound::NotNegative)],
     formula: &[Argument(1), Argument(1), Argument(0), Do(Add), Do(Divide)],
     equation: "K / (K + c)",
     summary: "inhibition by a solute: 1 without it, one half at K, 0 far above",

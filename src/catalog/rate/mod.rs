@@ -43,6 +43,30 @@ pub struct Mismatch {
 /// Dimensions of the arguments, `None` for the literal zero, which fits any, to that of the value.
 pub type Rule = fn(&[Option<Dimension>]) -> Result<Dimension, Mismatch>;
 
+/// What an argument may be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Bound {
+    /// Zero or more.
+    NotNegative,
+    AboveZero,
+}
+
+impl Bound {
+    pub fn allows(self, value: f64) -> bool {
+        match self {
+            Self::NotNegative => value >= 0.0,
+            Self::AboveZero => value > 0.0,
+        }
+    }
+
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::NotNegative => "zero or more",
+            Self::AboveZero => "above zero",
+        }
+    }
+}
+
 /// One function of the catalogue.
 #[derive(Clone, Copy)]
 pub struct Item {
@@ -50,6 +74,8 @@ pub struct Item {
     /// Name and meaning of each argument, in order.
     pub arguments: &'static [(&'static str, &'static str)],
     pub dimension: Rule,
+    /// Arguments that are bounded from below.
+    pub bounds: &'static [(usize, Bound)],
     pub formula: &'static [Step],
     /// As users write it.
     pub equation: &'static str,

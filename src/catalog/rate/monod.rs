@@ -1,7 +1,7 @@
 //! Saturation of a rate with its substrate.
 
 use super::Step::{Argument, Binary as Do};
-use super::{Item, ratio_of_alike};
+use super::{Bound, Item, ratio_of_alike};
 use crate::maths::operator::Binary::{Add, Divide};
 
 /// Share of the largest rate that a substrate allows.
@@ -15,6 +15,7 @@ pub(super) const ITEM: Item = Item {
     name: "monod",
     arguments: &[("c", "concentration of the substrate"), ("K", "half-saturation constant")],
     dimension: ratio_of_alike,
+    bounds: &[(1, Bound::NotNegative)],
     formula: &[Argument(0), Argument(1), Argument(0), Do(Add), Do(Divide)],
     equation: "c / (K + c)",
     summary: "saturation with a substrate: 0 without it, one half at K, 1 far above",

@@ -74,6 +74,24 @@ fn is_changed(plan: &Plan, component: usize) -> bool {
     })
 }
 
+/// Whether a species of this name takes part in a reaction of any kind.
+fn is_reacting(plan: &Plan, name: &str) -> bool {
+    let Some(idx) = plan.species.iter().position(|species| species.name == name) else { return false };
+    let is_it = |(species, _): &(usize, f64)| *species == idx;
+    let is_instant = plan.reactions.iter().any(|own| own.reactants.iter().chain(&own.products).any(is_it));
+    let component = plan.components.iter().position(|component| component.name == name);
+    let chemistry = plan.chemistry.as_ref();
+    let kinetics = chemistry.and_then(|chemistry| chemistry.kinetics.as_ref());
+    let is_slow = kinetics.is_some_and(|kinetics| {
+        let mut changes = kinetics.reactions.iter().flat_map(|reaction| &reaction.changes);
+        changes.any(|(other, _)| Some(*other) == component)
+    });
+    let equilibrium = chemistry.and_then(|chemistry| chemistry.equilibrium.as_ref());
+    let is_balanced =
+        equilibrium.is_some_and(|equilibrium| equilibrium.primaries.iter().any(|own| own.species == idx));
+    is_instant || is_slow || is_balanced
+}
+
 /// `α + Σ β_k U_k` over kept components.
 struct Relation {
     constant: f64,
@@ -96,10 +114,15 @@ fn note(draft: &mut Draft, relations: &[Option<Relation>]) {
             })
             .collect();
         let constant = number(relation.constant);
-        let why = if relation.terms.is_empty() {
-            format!("{constant} everywhere and always, restored at output")
-        } else {
-            format!("{constant}{} everywhere, restored at output", terms.concat())
+        // What is carried is a total, or what there was before reactions that are worked out at outputs.
+        let reacts = is_reacting(&draft.plan, &name(idx));
+        let why = match (relation.terms.is_empty(), reacts) {
+            (true, false) => format!("{constant} everywhere and always, restored at output"),
+            (true, true) => format!("{constant} everywhere before reaction, restored at output"),
+            (false, false) => format!("{constant}{} everywhere, restored at output", terms.concat()),
+            (false, true) => {
+                format!("{constant}{} everywhere before reaction, restored at output", terms.concat())
+            }
         };
         notes.push((format!("carrying species `{}`", name(idx)), why));
     }
