@@ -30,7 +30,7 @@ output particles  A, AB at t = 100 s
 #[test]
 fn runs_with_error_bars_are_verified_with_them() {
     let folder = Folder::new();
-    folder.write("a.lam", &SCENE.replace("20_000", "2_000"));
+    folder.write("a.lam", SCENE.replace("20_000", "2_000"));
     folder.lamella(&["run", "a.lam", "--out", "bars", "--error", "--plot"]).exits(0);
     folder.lamella(&["verify", "bars"]).exits(0);
 }

@@ -63,7 +63,7 @@ fn what_a_scene_does_not_have_cannot_be_turned() {
     folder.lamella(&absent).exits(2).says("[F128]").says("`rates`").says("`concentrations`");
     assert!(!folder.path("out").exists());
     // Values that are the same everywhere are folded into the outputs, and turned all the same.
-    folder.write("flat.lam", &SCENE.replace("if x < 0.5 m then 1 mol/L else 0", "0.25 mol/L"));
+    folder.write("flat.lam", SCENE.replace("if x < 0.5 m then 1 mol/L else 0", "0.25 mol/L"));
     let flat = ["stress", "flat.lam", "--knobs", "concentrations", "--decades", "1", "--out", "flat"];
     folder.lamella(&flat).exits(0).gives("3 trials in");
 }
