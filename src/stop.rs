@@ -4,7 +4,7 @@
 //! May use the scenario, the plan and the engine. It deliberately runs nothing and shows nothing.
 
 use crate::chemistry::Why;
-use crate::diagnostic::codes::{F103, R101, R102, R103, R104, R106, R107};
+use crate::diagnostic::codes::{F103, R101, R102, R103, R104, R106, R107, R108};
 use crate::diagnostic::{Code, Diagnostic, precise};
 use crate::engine::RunError;
 use crate::plan::chemistry::Integrator;
@@ -35,7 +35,8 @@ pub fn code(error: &RunError) -> Code {
         RunError::Chemistry { .. } => R107,
         RunError::TooManySubSteps { .. } => R106,
         RunError::OutOfMemory { .. } | RunError::Threads(_) => R103,
-        RunError::Plan(_) | RunError::Flow(_) => R104,
+        RunError::Flow(_) => R108,
+        RunError::Plan(_) => R104,
         RunError::Sink(_) => F103,
     }
 }
@@ -78,7 +79,9 @@ pub fn message(error: &RunError, scenario: &Scenario, plan: &Plan) -> Diagnostic
         RunError::TooManySubSteps { .. } => message
             .at(scenario.run.step_span, "within one step")
             .help("use a shorter `step`, or larger numbers in `step auto(…)`"),
-        RunError::Flow(_) => message.at(place.motion(), "this flow"),
+        RunError::Flow(_) => message.at(place.motion(), "this flow").help(
+            "bound a `conductivity` that varies by many decades with `max` and `min`; give a random one shorter correlation lengths, or fewer cells in `grid`",
+        ),
         RunError::Cancelled => message.note("no table was written; the same scene gives the same bytes again"),
         RunError::Plan(_) | RunError::Threads(_) | RunError::Sink(_) => message,
     }

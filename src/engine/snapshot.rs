@@ -17,7 +17,9 @@ pub struct Snapshot {
 /// The values of an observation; columns follow `plan.outputs[output_idx].quantities`.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Values {
-    /// Per quantity a column over the bins (first active axis slowest): mean and its standard error.
+    /// Per quantity a column over the bins (first active axis slowest): mean and its standard error. Particles are
+    /// counted per bin, or per bin of one quantity after the other where each has particles of its own. The mean of
+    /// a bin without fluid particles is NaN; where there is no particle with mass it is 0.
     Binned { mean: Vec<Vec<f64>>, standard_error: Vec<Vec<f64>>, n_particles: Vec<u64> },
     /// Per pair a column over the bins.
     Covariance { covariance: Vec<Vec<f64>>, n_particles: Vec<u64> },
@@ -35,10 +37,13 @@ impl Values {
     /// is no overflow.
     pub fn overflow(&self) -> Option<usize> {
         match self {
-            Self::Binned { mean, n_particles, .. } => mean.iter().position(|column| {
-                let mut bins = column.iter().zip(n_particles);
-                bins.any(|(value, &n)| value.is_infinite() || (n > 0 && value.is_nan()))
-            }),
+            Self::Binned { mean, n_particles, .. } => {
+                let is_broken = |(q, column): (usize, &Vec<f64>)| {
+                    let mut bins = column.iter().zip(counts(n_particles, column.len(), q));
+                    bins.any(|(value, &n)| value.is_infinite() || (n > 0 && value.is_nan()))
+                };
+                mean.iter().enumerate().position(is_broken)
+            }
             Self::Covariance { covariance, n_particles } => covariance.iter().position(|column| {
                 column.iter().zip(n_particles).any(|(value, &n)| n > 1 && !value.is_finite())
             }),
@@ -51,6 +56,12 @@ impl Values {
             }
         }
     }
+}
+
+/// The particles of one quantity in each of `n_bins`, of all or of its own.
+pub fn counts(n_particles: &[u64], n_bins: usize, quantity: usize) -> &[u64] {
+    let own = n_particles.get(quantity * n_bins..(quantity + 1) * n_bins).unwrap_or_default();
+    if n_particles.len() == n_bins { n_particles } else { own }
 }
 
 /// M = M_mean + M_cov and γ = M_cov / M_mean of one pair.

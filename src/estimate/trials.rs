@@ -114,8 +114,7 @@ fn seed(root: u64, group: usize) -> u64 {
 fn fewer(plan: &Plan) -> Plan {
     let mut plan = watched(plan);
     let count = plan.particles.count.div_ceil(FEWER);
-    plan.particles.volume *= plan.particles.count as f64 / count as f64;
-    plan.particles.count = count;
+    plan.set_count(count);
     plan
 }
 

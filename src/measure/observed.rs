@@ -4,7 +4,7 @@
 //! compares nothing.
 
 use super::grid::Grid;
-use crate::engine::snapshot::{Outcome, Snapshot, Values};
+use crate::engine::snapshot::{Outcome, Snapshot, Values, counts};
 use crate::plan::{Output, OutputKind, Plan, Quantity};
 
 /// A finished run.
@@ -64,7 +64,7 @@ pub(super) fn series(
     let times = snapshots
         .iter()
         .filter(|snapshot| snapshot.output_idx == output_idx)
-        .map(|snapshot| observed(snapshot, column, grid.n_bins()))
+        .map(|snapshot| observed(plan, snapshot, column, grid.n_bins()))
         .collect::<Result<Vec<_>, _>>()?;
     Ok(Series { output_idx, grid, times })
 }
@@ -77,12 +77,18 @@ pub(super) fn column(output: &Output, quantity: Quantity) -> Option<usize> {
     })
 }
 
-fn observed(snapshot: &Snapshot, column: usize, n_bins: usize) -> Result<Observed, String> {
+fn observed(plan: &Plan, snapshot: &Snapshot, column: usize, n_bins: usize) -> Result<Observed, String> {
     let single = |value: Option<f64>| value.map(|value| (vec![value], None, vec![true]));
+    // A bin without masses holds none; one without fluid says nothing.
+    let least = u64::from(plan.transport.is_none());
     let found = match &snapshot.values {
-        Values::Binned { mean, standard_error, n_particles } => mean
-            .get(column)
-            .map(|mean| (mean.clone(), standard_error.get(column).cloned(), filled(n_particles, 1))),
+        Values::Binned { mean, standard_error, n_particles } => mean.get(column).map(|mean| {
+            (
+                mean.clone(),
+                standard_error.get(column).cloned(),
+                filled(counts(n_particles, mean.len(), column), least),
+            )
+        }),
         Values::Covariance { covariance, n_particles } => {
             covariance.get(column).map(|values| (values.clone(), None, filled(n_particles, 2)))
         }

@@ -12,6 +12,7 @@ impl Plan {
         self.check_fields()?;
         self.check_chemistry()?;
         self.check_mixing()?;
+        self.check_transport()?;
         self.outputs.iter().try_for_each(|output| self.check_output(output))
     }
 
@@ -105,7 +106,7 @@ pub(super) fn require(is_right: bool, otherwise: impl FnOnce() -> String) -> Res
 }
 
 /// Registers point backwards; inputs are x, y, z, t.
-fn check_tape(tape: &Tape) -> Result<(), String> {
+pub(super) fn check_tape(tape: &Tape) -> Result<(), String> {
     check_operations(&tape.operations, usize::from(super::build_tape::TIME_INPUT) + 1)
 }
 

@@ -3,6 +3,7 @@
 use super::chemistry::{Chemistry, Method};
 use super::integrator::Expected;
 use super::time_scales::TimeScales;
+use super::transport::{Flow, Transport};
 use super::{Normals, Output, OutputKind, Plan, Stage, ZoneRate};
 use serde::Serialize;
 
@@ -33,6 +34,10 @@ mod table {
     pub(super) const SPECIATIONS: f64 = 2.0;
     /// Sub-steps of a step if time scales are not known: what is taken at a constant rate runs out somewhere.
     pub(super) const UNKNOWN: f64 = 6.0;
+    /// One displacement of a particle along its track, walls and random numbers included.
+    pub(super) const TRACK: f64 = 15.0;
+    /// Sub-steps that a particle takes in a step of `step auto` in cells.
+    pub(super) const SUB_STEPS: f64 = crate::plan::auto_step::CELLS_PER_STEP;
     /// One particle observed once: positions worked out again, species restored, sums.
     pub(super) const OBSERVE: f64 = 25.0;
     /// One value of a bin observed once: its sums, mean and error.
@@ -94,7 +99,7 @@ pub fn estimate(plan: &Plan, scales: Option<&TimeScales>) -> Cost {
         Stage::Mix => table::MIX * n_relaxed,
         Stage::React => react_cost,
         Stage::FusedReact => react_cost + table::MIX * n_relaxed,
-        Stage::Move => move_cost * n_axes,
+        Stage::Move => plan.transport.as_ref().map_or(move_cost * n_axes, track_cost),
         Stage::Bound => table::BOUND * n_axes,
         Stage::Average => table::AVERAGE * n_values,
         Stage::FusedStep => {
@@ -115,13 +120,21 @@ pub fn estimate(plan: &Plan, scales: Option<&TimeScales>) -> Cost {
         + (table::OBSERVE_BIN + table::WRITE_ROW) * n_binned;
     let n_bins: f64 = plan.axes.iter().map(|axis| axis.bins as f64).product();
     Cost {
-        state_bytes: (8.0 * n_particles * (n_axes + n_values)) as u64,
+        state_bytes: (8.0 * n_particles * (n_axes + n_values + f64::from(u8::from(plan.transport.is_some()))))
+            as u64,
         bin_bytes: (8.0 * n_bins * (1.0 + n_values) * 2.0) as u64,
         output_bytes: output_bytes(plan),
         particle_steps,
         stages,
         cpu_seconds: nanoseconds * 1e-9,
     }
+}
+
+/// Nanoseconds per particle and step of a walk along tracks.
+fn track_cost(transport: &Transport) -> f64 {
+    let in_cells = matches!(transport.flow, Flow::Darcy(_) | Flow::File(_));
+    let n = if in_cells && transport.sub_steps.is_some() { table::SUB_STEPS } else { 1.0 };
+    table::TRACK * n
 }
 
 /// Nanoseconds per particle and step, with the sub-steps that are expected.

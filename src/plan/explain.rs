@@ -2,8 +2,8 @@
 
 use super::compile::Compiled;
 use super::cost::n_stored_values;
-use super::explain_reactions;
 use super::{Normals, Plan, Quantity, Stage, ZoneRate};
+use super::{explain_reactions, explain_transport};
 use crate::diagnostic::number;
 use std::fmt::Write as _;
 
@@ -16,6 +16,7 @@ pub fn explain(compiled: &Compiled, name: &str, title: Option<&str>) -> String {
     }
     let _ = writeln!(text, "  hash {}", compiled.hash);
     section(&mut text, "what runs", &scene_lines(&compiled.plan));
+    section(&mut text, "transport", &explain_transport::lines(&compiled.plan));
     section(&mut text, "each step, in this order", &step_lines(compiled));
     section(&mut text, "what particles carry", &field_lines(&compiled.plan));
     section(&mut text, "reactions", &explain_reactions::lines(&compiled.plan));
@@ -56,14 +57,20 @@ pub fn grouped(value: u64) -> String {
 fn scene_lines(plan: &Plan) -> Vec<String> {
     let mut lines = vec![
         format!(
-            "{} fluid particles, {:?} placement, seed {}",
+            "{} {} particles, {:?} placement, seed {}",
             grouped(plan.particles.count),
+            if plan.transport.is_some() { "mass" } else { "fluid" },
             plan.particles.placement,
             plan.seed
         )
         .to_lowercase(),
     ];
     for (idx, axis) in plan.axes.iter().enumerate() {
+        if plan.transport.is_some() {
+            let (name, low, high) = (axis_name(axis.index), number(axis.low), number(axis.high));
+            lines.push(format!("axis {name}: {low} .. {high} m"));
+            continue;
+        }
         let b = &plan.walk.spread[idx * (idx + 1) / 2..][..=idx];
         let dispersion = 0.5 * b.iter().map(|b| b * b).sum::<f64>();
         lines.push(format!(
@@ -116,6 +123,9 @@ fn step_lines(compiled: &Compiled) -> Vec<String> {
 
 fn field_lines(plan: &Plan) -> Vec<String> {
     let mut lines = Vec::new();
+    if plan.transport.is_some() {
+        return vec!["a mass of one species each, beside the position".to_owned()];
+    }
     let n_values = n_stored_values(plan);
     let carried = plan.components.iter().filter(|component| !component.is_immobile);
     let names: Vec<&str> = carried.map(|component| component.name.as_str()).collect();

@@ -6,8 +6,8 @@
 use super::cost::Cost;
 use super::passes::Draft;
 use super::time_scales::TimeScales;
-use super::{OutputKind, Plan, ZoneRate, edges, reaction_limits};
-use crate::diagnostic::codes::{N101, N102, N103, N104, N201, N202, N203, N301};
+use super::{OutputKind, Plan, ZoneRate, auto_step, edges, reaction_limits};
+use crate::diagnostic::codes::{N101, N102, N103, N104, N201, N202, N203, N204, N301};
 use crate::diagnostic::{Diagnostic, number, precise};
 use crate::scenario::{self, MAX_BINS, Scenario};
 use crate::source::Span;
@@ -44,8 +44,13 @@ pub fn check(
     let plan = &draft.plan;
     let mut limits = Vec::new();
     let mut diagnostics = Vec::new();
-    travel(scenario, plan, &mut limits, &mut diagnostics);
-    edges::check(scenario, plan, &mut diagnostics);
+    // Masses walk by what `transport` says; the walk of fluid has no numbers for them.
+    if plan.transport.is_none() {
+        travel(scenario, plan, &mut limits, &mut diagnostics);
+        edges::check(scenario, plan, &mut diagnostics);
+    } else {
+        diagnostics.extend(between_steps(scenario, draft));
+    }
     if plan.mixing.is_some() {
         particles_per_bin(scenario, plan, &mut limits, &mut diagnostics);
         exchange(scenario, plan, &mut limits, &mut diagnostics);
@@ -54,6 +59,30 @@ pub fn check(
     reaction_limits::check(scenario, plan, scales, &mut limits, &mut diagnostics);
     check_memory(scenario, plan, cost, memory, &mut diagnostics);
     (limits, diagnostics)
+}
+
+/// Masses are looked at after whole steps: between two of them nothing is known yet.
+fn between_steps(scenario: &Scenario, draft: &Draft) -> Option<Diagnostic> {
+    let (plan, time) = (&draft.plan, &draft.plan.time);
+    let is_last = |t: f64| (t - time.duration).abs() <= 1e-9 * time.step;
+    let (output_idx, t) = auto_step::times_between(&plan.outputs, time.step).find(|(_, t)| !is_last(*t))?;
+    let kind = plan.outputs[output_idx].kind;
+    let written = scenario.outputs.iter().find(|output| output.kind == kind && output.times.contains(&t));
+    let message = Diagnostic::refused(N204, "mass particles are looked at after whole steps only")
+        .at(scenario.run.step_span, format!("steps of {} s", precise(time.step)))
+        .also(
+            written.map_or(scenario.run.span, |output| output.span),
+            format!("{} s is asked for here", precise(t)),
+        )
+        .found(format!("an output at {} s, between two steps", precise(t)))
+        .expected("outputs at multiples of the step");
+    let fitting = auto_step::fitting(&plan.outputs, time.step.min(time.duration), time.duration);
+    Some(match fitting {
+        Some(step) => {
+            message.help(format!("use `step {} s`, of which all output times are multiples", precise(step)))
+        }
+        None => message.help("choose a step of which the output times are multiples"),
+    })
 }
 
 pub(super) fn axis_name(index: usize) -> &'static str {

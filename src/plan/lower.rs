@@ -3,12 +3,14 @@
 use super::build_tape::build_tape;
 use super::evaluation::{self, Evaluation};
 use super::lower_chemistry::{self, Network};
+use super::lower_transport::{self, of_fluid};
 use super::{
     Axis, InstantReaction, Mixing, NUMERICS_VERSION, Normals, Output, OutputUnit, Particles, Plan, Quantity,
-    Stage, Time, Walk, Zone, ZoneRate, method,
+    Stage, Time, Walk, Zone, ZoneRate, auto_step, method, transport_limits,
 };
 use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{D008, M005};
+use crate::scenario::transport::Auto;
 use crate::scenario::{self, Scenario};
 
 /// A plan with what computes references and measures from its results, and warnings.
@@ -26,7 +28,10 @@ pub fn lower(scenario: &Scenario) -> Result<Lowered, Vec<Diagnostic>> {
     let axes: Vec<Axis> =
         scenario.domain.axes.iter().zip(bins).map(|(axis, bins)| lower_axis(axis, bins)).collect();
     let Network { species, components, chemistry, warnings } = lower_chemistry::network(scenario, &axes)?;
-    let volume: f64 = axes.iter().map(|axis| axis.high - axis.low).product();
+    let transport = lower_transport::transport(scenario, &axes)?;
+    let extent: f64 = axes.iter().map(|axis| axis.high - axis.low).product();
+    // A particle is a volume of water.
+    let volume = extent * lower_transport::porosity_of_fluid(scenario);
     let mut plan = Plan {
         numerics: NUMERICS_VERSION,
         walk: walk(scenario),
@@ -40,8 +45,8 @@ pub fn lower(scenario: &Scenario) -> Result<Lowered, Vec<Diagnostic>> {
         mixing: scenario.mixing.as_ref().map(lower_mixing),
         reactions: scenario.reactions.iter().filter_map(lower_reaction).collect(),
         chemistry,
-        transport: None,
-        time: time(scenario),
+        transport,
+        time: Time::new(scenario.run.duration, scenario.run.step),
         outputs: scenario.outputs.iter().map(lower_output).collect(),
         stages: vec![Stage::Mix, Stage::Move, Stage::Bound, Stage::Average, Stage::Observe],
         seed: scenario.seed,
@@ -50,11 +55,58 @@ pub fn lower(scenario: &Scenario) -> Result<Lowered, Vec<Diagnostic>> {
     if !plan.walk.drift.iter().chain(&plan.walk.spread).copied().all(f64::is_finite) {
         return Err(vec![unbounded_walk(scenario, &plan)]);
     }
+    if plan.transport.is_some() {
+        only_masses(&mut plan);
+    }
+    if let Some(auto) = scenario.run.auto {
+        choose_step(scenario, &mut plan, auto)?;
+    }
+    if let Some(transport) = &plan.transport {
+        let found = transport_limits::check(scenario, &plan.axes, transport);
+        if !found.is_empty() {
+            return Err(found);
+        }
+    }
     method::choose(&mut plan);
     if plan.reacts_in_steps() {
         plan.stages.insert(1, Stage::React);
     }
     Ok((plan, evaluation, warnings))
+}
+
+/// Masses carry nothing beside their position, and walk by `transport` alone.
+fn only_masses(plan: &mut Plan) {
+    plan.components.clear();
+    plan.species.iter_mut().for_each(|species| species.terms.clear());
+    plan.chemistry = None;
+    plan.walk.drift.fill(0.0);
+    plan.walk.spread.fill(0.0);
+    plan.stages = vec![Stage::Move, Stage::Observe];
+    let populations = plan.transport.iter().flat_map(|transport| &transport.populations);
+    plan.particles.count = populations.fold(0, |sum: u64, it| sum.saturating_add(it.count)).max(1);
+}
+
+/// `step auto`: a step by the criteria, which the particles of a flow in cells divide further.
+fn choose_step(scenario: &Scenario, plan: &mut Plan, auto: Auto) -> Result<(), Vec<Diagnostic>> {
+    let duration = scenario.run.duration;
+    let chosen = match &plan.transport {
+        Some(transport) => auto_step::of_masses(&plan.axes, &plan.outputs, transport, auto, duration),
+        None => auto_step::of_fluid(&plan.axes, &plan.outputs, &plan.walk, auto, duration),
+    };
+    let n_steps = duration / chosen.step;
+    if n_steps > scenario::MAX_STEPS {
+        let message = Diagnostic::error(M005, "the run would have too many steps")
+            .at(scenario.run.step_span, format!("{n_steps:.3e} steps by these criteria"))
+            .found(format!("{n_steps:.3e} steps"))
+            .expected("at most 1e12")
+            .help("use larger bins or cells, or a `step` of your own");
+        return Err(vec![message]);
+    }
+    plan.time = Time::new(duration, chosen.step);
+    if let Some(transport) = &mut plan.transport {
+        transport.sub_steps = chosen.sub_steps;
+    }
+    Ok(())
 }
 
 /// Numbers that can be written may have a difference or a product that is none.
@@ -85,8 +137,7 @@ fn lower_axis(axis: &scenario::Axis, bins: usize) -> Axis {
 
 /// Drift in the frame and the Cholesky factor of 2 D over the axes of the domain.
 fn walk(scenario: &Scenario) -> Walk {
-    let velocity = scenario.flow.as_ref().map_or([0.0; 3], |flow| flow.value);
-    let tensor = scenario.dispersion.as_ref().map_or([[0.0; 3]; 3], |tensor| tensor.value);
+    let (velocity, tensor) = of_fluid(scenario);
     let indices: Vec<usize> = scenario.domain.axes.iter().map(|axis| axis.index).collect();
     let drift = indices.iter().map(|&index| velocity[index] - scenario.domain.frame[index]).collect();
     let doubled: Vec<Vec<f64>> = indices
@@ -149,10 +200,6 @@ fn lower_reaction(reaction: &scenario::Reaction) -> Option<InstantReaction> {
         reactants: reaction.reactants.clone(),
         products: reaction.products.clone(),
     })
-}
-
-fn time(scenario: &Scenario) -> Time {
-    Time::new(scenario.run.duration, scenario.run.step)
 }
 
 fn lower_output(output: &scenario::Output) -> Output {

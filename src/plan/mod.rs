@@ -3,9 +3,11 @@
 //! Owns the plan's types, its lowering from a scenario, the passes, the limits and the hash. May
 //! use the words, the catalogue and `scenario`. It deliberately runs nothing.
 
+mod auto_step;
 pub mod build_tape;
 mod check;
 mod check_chemistry;
+mod check_transport;
 pub mod chemistry;
 pub mod compile;
 pub mod cost;
@@ -15,18 +17,22 @@ pub mod eliminate;
 pub mod evaluation;
 pub mod explain;
 mod explain_reactions;
+mod explain_transport;
 pub mod gates;
 mod integrator;
 mod law;
 pub mod limits;
 mod lower;
 mod lower_chemistry;
+mod lower_transport;
 mod method;
 pub mod passes;
 mod reaction_limits;
+mod shares;
 pub mod tape;
 pub mod time_scales;
 pub mod transport;
+mod transport_limits;
 
 pub use crate::scenario::{OutputKind, Placement, Side};
 pub use compile::{Compiled, Options, Selection, compile, hash};
@@ -186,6 +192,19 @@ pub struct Time {
     /// Whole steps; the last one is shortened if `duration` is not a multiple.
     pub n_steps: u64,
     pub duration: f64,
+}
+
+impl Plan {
+    /// Sets the number of particles; each then stands for as much more or less.
+    pub fn set_count(&mut self, count: u64) {
+        let before = self.particles.count;
+        self.particles.volume *= before as f64 / count as f64;
+        self.particles.count = count;
+        for population in self.transport.iter_mut().flat_map(|transport| &mut transport.populations) {
+            let share = population.count as f64 / before as f64;
+            population.count = ((count as f64 * share).round() as u64).max(1);
+        }
+    }
 }
 
 impl Time {

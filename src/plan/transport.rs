@@ -4,6 +4,7 @@
 //! particles are moved by the engine.
 
 use super::tape::Tape;
+pub use crate::scenario::Covariance;
 use serde::{Deserialize, Serialize};
 
 /// Transport in anything but uniform flow between simple sides, or of particles that carry mass.
@@ -84,15 +85,6 @@ pub enum Conductivity {
         lengths: Vec<f64>,
         seed: u64,
     },
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Covariance {
-    /// `σ² exp(−√Σ (d_i/λ_i)²)`
-    Exponential,
-    /// `σ² exp(−Σ (d_i/λ_i)²)`
-    Gaussian,
 }
 
 /// A well in a Darcy flow.

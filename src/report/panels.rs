@@ -8,7 +8,7 @@ use super::display::{self, Shown, plain};
 use super::heat::Heat;
 use super::panel::{KeyEntry, Look, Mark, Panel};
 use super::scale::{Scale, Spacing};
-use crate::engine::snapshot::{Snapshot, Values};
+use crate::engine::snapshot::{Snapshot, Values, counts};
 use crate::measure::Curve;
 use crate::plan::{Output, OutputKind, Plan, Quantity};
 use crate::table::{Grid, value_dimension};
@@ -133,7 +133,7 @@ impl<'a> Story<'a> {
         let mut marks = Vec::new();
         for snapshot in self.of_output(output_idx) {
             let Some(color) = self.color_at(snapshot.t) else { continue };
-            let points = bin_values(&snapshot.values, q, centres);
+            let points = bin_values(&snapshot.values, self.plan.transport.is_some(), q, centres);
             let every = points.len().div_ceil(MOST_DOTS).max(1);
             marks.push(Mark { points: points.into_iter().step_by(every).collect(), color, look: Look::Dots });
         }
@@ -270,12 +270,15 @@ impl<'a> Story<'a> {
             .sum();
         let Values::Binned { mean, n_particles, .. } = &snapshot.values else { return None };
         let mean = mean.get(q)?;
+        let n_particles = counts(n_particles, mean.len(), q);
+        // A bin without masses holds none, and counts like all others.
+        let has_masses = self.plan.transport.is_some();
         let largest = mean.iter().filter(|v| v.is_finite()).fold(0.0, |most: f64, v| most.max(v.abs()));
         let shown = display::value(self.plan, output, output.quantities[q], self.n_axes, largest);
         let (stride_a, stride_b) = (grid.stride(a)?, grid.stride(b)?);
         let cell = |i: usize, j: usize| {
             let row = i * stride_a + j * stride_b + middle;
-            (mean[row] / shown.factor, n_particles[row])
+            (mean[row] / shown.factor, if has_masses { 1 } else { n_particles[row] })
         };
         let n = (grid.centres(a)?.len(), grid.centres(b)?.len());
         let ends = |axis: usize| self.plan.axes.iter().find(|other| other.index == axis);
@@ -327,16 +330,19 @@ fn spread(values: &[f64], n: usize) -> Vec<f64> {
     (1..=n).map(|k| values[k * values.len() / n - 1]).collect()
 }
 
-/// Bins that hold particles.
-fn bin_values(values: &Values, q: usize, centres: &[f64]) -> Vec<(f64, f64)> {
+/// Bins that hold particles; all of them where particles carry mass.
+fn bin_values(values: &Values, has_masses: bool, q: usize, centres: &[f64]) -> Vec<(f64, f64)> {
     let (column, n_particles) = match values {
-        Values::Binned { mean, n_particles, .. } => (mean.get(q), n_particles),
-        Values::Covariance { covariance, n_particles } => (covariance.get(q), n_particles),
+        Values::Binned { mean, .. } if has_masses => (mean.get(q), None),
+        Values::Binned { mean, n_particles, .. } => (mean.get(q), Some(n_particles)),
+        Values::Covariance { covariance, n_particles } => (covariance.get(q), Some(n_particles)),
         _ => return Vec::new(),
     };
     let column = column.map_or(&[][..], Vec::as_slice);
-    let rows = centres.iter().zip(column).zip(n_particles);
-    rows.filter(|((_, value), n)| **n > 0 && value.is_finite()).map(|((x, value), _)| (*x, *value)).collect()
+    let is_known = |row: usize| n_particles.is_none_or(|n| n.get(row).is_some_and(|&n| n > 0));
+    let rows = centres.iter().zip(column).enumerate();
+    let rows = rows.filter(|(row, (_, value))| is_known(*row) && value.is_finite());
+    rows.map(|(_, (x, value))| (*x, *value)).collect()
 }
 
 fn value_at(values: &Values, q: usize) -> f64 {

@@ -26,6 +26,7 @@ pub(super) struct Allow {
 
 impl Allow {
     pub(super) const CONSTANT: Self = Self { position: false, time: false, species: false, results: false };
+    pub(super) const PLACE: Self = Self { position: true, time: false, species: false, results: false };
     pub(super) const INITIAL: Self = Self { position: true, time: false, species: true, results: false };
     pub(super) const RATE: Self = Self { position: true, time: true, species: true, results: false };
     pub(super) const REFERENCE: Self = Self { position: true, time: true, species: false, results: false };
@@ -46,6 +47,8 @@ pub(super) struct Checker<'a> {
     pub diagnostics: Vec<Diagnostic>,
     /// Names of the domain's axes with their index.
     pub axes: Vec<(String, usize)>,
+    /// Extents of the axes: index, low, high; none while they are not known.
+    pub extents: Vec<(usize, f64, f64)>,
     /// Concentration dimension of each species, as far as known.
     pub species_dimensions: Vec<Option<Dimension>>,
     /// Whether the initial concentration of some species is wrong.

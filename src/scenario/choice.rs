@@ -17,7 +17,7 @@ pub enum Side {
     Open,
 }
 
-pub(super) const SIDES: &[(&str, Side)] =
+const SIDES: &[(&str, Side)] =
     &[("reflect", Side::Reflect), ("open", Side::Open), ("periodic", Side::Periodic)];
 
 impl Side {
@@ -26,6 +26,19 @@ impl Side {
         word(SIDES, self)
     }
 }
+
+/// How a random field is correlated over distances `d_i`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Covariance {
+    /// `σ² exp(−√Σ (d_i/λ_i)²)`
+    Exponential,
+    /// `σ² exp(−Σ (d_i/λ_i)²)`
+    Gaussian,
+}
+
+pub(super) const COVARIANCES: &[(&str, Covariance)] =
+    &[("exponential", Covariance::Exponential), ("gaussian", Covariance::Gaussian)];
 
 /// Where particles start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -1,13 +1,14 @@
 //! The phase itself: statements gathered, names defined, every part resolved in its turn.
 
 use super::check::Checker;
-use super::expression::Type;
+use super::expression::{Expr, Type};
 use super::scope::{Origin, Scope};
 use super::settings::{check_setting, read_settings, unit_as_written};
-use super::{Parameter, Scenario, Settings};
+use super::transport::{self, Dispersion, Flow};
+use super::{Domain, Parameter, Scenario, Settings};
 use crate::diagnostic::codes::{D001, M001, M002, M018, P002};
 use crate::diagnostic::{Diagnostic, precise};
-use crate::source::{Sources, Span};
+use crate::source::{Sources, Span, Spanned};
 use crate::syntax::tree::{self, StatementKind};
 
 /// Statements by kind, in the order of the text.
@@ -24,8 +25,10 @@ pub(super) struct Statements<'a> {
     pub chemistry: Option<(Span, &'a [tree::Field])>,
     pub domain: Option<(Span, &'a tree::Domain)>,
     pub boundaries: Vec<&'a tree::Boundary>,
+    pub medium: Option<(Span, &'a [tree::Field])>,
     pub flow: Option<(Span, &'a tree::Flow)>,
-    pub dispersion: Option<(Span, &'a tree::Expr)>,
+    pub dispersion: Option<(Span, &'a tree::Dispersion)>,
+    pub sources: Vec<(Span, &'a tree::Source)>,
     pub zones: Option<(Span, &'a [tree::Zone])>,
     pub average: Option<(Span, &'a tree::Average)>,
     pub initials: Vec<&'a tree::Assignment>,
@@ -66,6 +69,7 @@ pub fn resolve(
         scope: Scope::default(),
         diagnostics,
         axes: super::geometry::axis_names(&statements),
+        extents: Vec::new(),
         species_dimensions: vec![None; statements.species.len()],
         is_initial_wrong: false,
         call_stack: Vec::new(),
@@ -146,6 +150,8 @@ fn gather<'a>(file: &'a tree::File, diagnostics: &mut Vec<Diagnostic>) -> Statem
             StatementKind::Chemistry(s) => all.chemistry = Some((span, s)),
             StatementKind::Domain(s) => all.domain = Some((span, s)),
             StatementKind::Boundary(s) => all.boundaries.push(s),
+            StatementKind::Medium(s) => all.medium = Some((span, s)),
+            StatementKind::Source(s) => all.sources.push((span, s)),
             StatementKind::Flow(s) => all.flow = Some((span, s)),
             StatementKind::Dispersion(s) => all.dispersion = Some((span, s)),
             StatementKind::MixingZones(s) => all.zones = Some((span, s)),
@@ -172,6 +178,7 @@ fn single(kind: &StatementKind) -> Option<&'static str> {
         StatementKind::Seed(_) => "seed",
         StatementKind::Chemistry(_) => "chemistry",
         StatementKind::Domain(_) => "domain",
+        StatementKind::Medium(_) => "medium",
         StatementKind::Flow(_) => "flow",
         StatementKind::Dispersion(_) => "dispersion",
         StatementKind::MixingZones(_) => "mixing zones",
@@ -239,20 +246,20 @@ fn build<'a>(
         report_missing(checker, statements, file);
     }
     let parameters = parameters(checker, statements);
-    let domain = super::geometry::domain(checker, statements);
+    let mut domain = super::geometry::domain(checker, statements);
     let species = super::model::species(checker, statements);
     let reactions = super::reactions::reactions(checker, statements);
     let chemistry = super::chemistry::chemistry(checker, statements);
-    let flow = super::geometry::flow(checker, statements);
-    let dispersion = super::geometry::dispersion(checker, statements);
+    let motion = motion(checker, statements, domain.as_mut());
     let mixing = super::zones::mixing(checker, statements);
     let bins = super::geometry::bins(checker, statements);
-    let particles = super::model::particles(checker, statements);
+    let particles = super::transport::masses::particles(checker, statements);
     if let (Some(domain), Some(particles)) = (&domain, &particles) {
         super::geometry::check_volume(checker, domain, particles);
     }
     let run = super::model::run(checker, statements);
     let duration = run.as_ref().map(|run| run.duration);
+    let sources = super::transport::source::sources(checker, statements, duration, domain.as_ref());
     let (outputs, are_outputs_right) =
         super::observe::outputs(checker, statements, duration, bins.as_ref().and_then(Option::as_ref));
     let (references, are_references_right) = super::reference::references(checker, statements, &outputs);
@@ -268,21 +275,20 @@ fn build<'a>(
     if !(are_outputs_right && are_references_right && is_analysis_right) {
         return None;
     }
+    let (medium, flow, dispersion) = motion?;
     let scenario = Scenario {
         title: statements.title.map(|title| title.value.clone()),
         citations: statements.citations.iter().map(|text| text.value.clone()).collect(),
-        settings: settings
-            .set
-            .iter()
-            .map(|(name, value)| (name.trim().into(), value.trim().into()))
-            .collect(),
+        settings: as_given(settings),
         parameters,
         species: species.all_right()?,
         reactions: reactions?,
         chemistry: chemistry?,
         domain: domain?,
-        flow: flow?,
-        dispersion: dispersion?,
+        medium,
+        flow,
+        dispersion,
+        sources: sources?,
         mixing: mixing?,
         bins: bins?,
         particles: particles?,
@@ -295,7 +301,33 @@ fn build<'a>(
         reports,
     };
     super::reactions::check_places(checker, &scenario);
+    super::transport::restriction::check(checker, &scenario);
     Some(scenario)
+}
+
+/// `--set name=value` without the blanks around.
+fn as_given(settings: &Settings) -> Vec<(String, String)> {
+    settings.set.iter().map(|(name, value)| (name.trim().into(), value.trim().into())).collect()
+}
+
+/// Porosity, flow and dispersion; absent where the scene says nothing of one.
+type Motion = (Option<Spanned<Expr>>, Option<Spanned<Flow>>, Option<Spanned<Dispersion>>);
+
+/// What moves the water and what it carries in at the sides; each part is checked, whatever is wrong with
+/// another one.
+fn motion<'a>(
+    checker: &mut Checker<'a>,
+    statements: &Statements<'a>,
+    domain: Option<&mut Domain>,
+) -> Option<Motion> {
+    let are_sides_right = domain.is_none_or(|domain| {
+        checker.extents = domain.axes.iter().map(|axis| (axis.index, axis.low, axis.high)).collect();
+        transport::sides::carried(checker, statements, domain).is_some()
+    });
+    let medium = transport::flow::porosity(checker, statements);
+    let flow = transport::flow::flow(checker, statements);
+    let dispersion = transport::dispersion::dispersion(checker, statements);
+    are_sides_right.then_some((medium?, flow?, dispersion?))
 }
 
 fn report_missing<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>, file: &'a tree::File) {

@@ -1,11 +1,9 @@
-//! Domain, sides, frame, flow, dispersion and bins.
+//! Domain, frame and bins.
 
 use super::check::Checker;
-use super::choice::SIDES;
 use super::collect::Statements;
-use super::slot::tuple_parts;
 use super::{Axis, Domain, Particles, Side};
-use crate::diagnostic::codes::{D009, M001, M002, M004, M006, M007, M008};
+use crate::diagnostic::codes::{D009, M002, M006};
 use crate::diagnostic::{Diagnostic, precise};
 use crate::source::{Span, Spanned};
 use crate::syntax::tree;
@@ -61,7 +59,8 @@ pub(super) fn domain<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>)
     let mut axes: Vec<Axis> = axes.into_iter().collect::<Option<_>>()?;
     axes.sort_by_key(|axis| axis.index);
     // The names of the sides follow from the axes: with a wrong number of these nothing is said of them.
-    let sides = is_right_number && set_sides(checker, statements, &mut axes, statement);
+    let sides =
+        is_right_number && super::transport::sides::set_sides(checker, statements, &mut axes, statement);
     (n_axes.is_some() && sides).then_some(())?;
     Some(Domain { span, axes, frame: frame? })
 }
@@ -96,6 +95,7 @@ fn read_axis<'a>(
         high: high.value,
         low_side: Side::Reflect,
         high_side: Side::Reflect,
+        patches: [Vec::new(), Vec::new()],
         low_side_span: axis.name.span,
         high_side_span: axis.name.span,
         span: axis.name.span.to(high.span),
@@ -123,208 +123,6 @@ pub(super) fn check_volume(checker: &mut Checker<'_>, domain: &Domain, particles
     let place = first.span.to(last.span);
     let place = if first.span.start <= last.span.start { place } else { last.span.to(first.span) };
     checker.require(is_right, what, found, SIZE, place);
-}
-
-/// The words for the two sides of an axis in a domain of given axes.
-///
-/// x has left and right; the vertical axis (z, or y without z) has bottom and top; y of a box has
-/// front and back. A line may call its sides left and right whatever its axis.
-fn side_names(index: usize, axes: &[usize]) -> Vec<[&'static str; 2]> {
-    let mut names = match index {
-        0 => vec![["left", "right"]],
-        1 if axes.contains(&2) => vec![["front", "back"]],
-        _ => vec![["bottom", "top"]],
-    };
-    if axes.len() == 1 && index != 0 {
-        names.push(["left", "right"]);
-    }
-    names
-}
-
-/// Every side must say what happens there: physics has no default.
-fn set_sides<'a>(
-    checker: &mut Checker<'a>,
-    statements: &Statements<'a>,
-    axes: &mut [Axis],
-    domain: &tree::Domain,
-) -> bool {
-    let indices: Vec<usize> = axes.iter().map(|axis| axis.index).collect();
-    let mut words = Vec::new();
-    for (axis_idx, axis) in axes.iter().enumerate() {
-        for pair in side_names(axis.index, &indices) {
-            words.push((pair[0], (axis_idx, 0)));
-            words.push((pair[1], (axis_idx, 1)));
-        }
-    }
-    let mut set: Vec<[Option<(Side, Span)>; 2]> = vec![[None; 2]; axes.len()];
-    let mut is_right = true;
-    for statement in &statements.boundaries {
-        let kind = checker.word(&statement.kind, "a kind of boundary", SIDES);
-        for side in &statement.sides {
-            let Some((axis_idx, end)) = checker.word(side, "a side of this domain", &words) else {
-                is_right = false;
-                continue;
-            };
-            if let Some((_, first)) = set[axis_idx][end] {
-                checker.report(
-                    Diagnostic::error(M002, format!("side `{}` is given twice", side.value))
-                        .at(side.span, "here again")
-                        .also(first, "first here")
-                        .found("two boundaries for one side")
-                        .expected("one boundary for every side"),
-                );
-                is_right = false;
-            }
-            match kind {
-                Some(kind) => set[axis_idx][end] = Some((kind, side.span)),
-                // The wrong word has been reported; the side itself is not missing.
-                None => {
-                    set[axis_idx][end] = Some((Side::Reflect, side.span));
-                    is_right = false;
-                }
-            }
-        }
-    }
-    let mut missing = Vec::new();
-    for (axis_idx, axis) in axes.iter_mut().enumerate() {
-        let names = side_names(axis.index, &indices)[0];
-        for (end, name) in names.into_iter().enumerate() {
-            match set[axis_idx][end] {
-                None => missing.push(name),
-                Some((side, span)) if end == 0 => (axis.low_side, axis.low_side_span) = (side, span),
-                Some((side, span)) => (axis.high_side, axis.high_side_span) = (side, span),
-            }
-        }
-        is_right &= check_periodic(checker, &set[axis_idx], axis, names);
-    }
-    if !missing.is_empty() && is_right {
-        report_missing_sides(checker, &missing, domain);
-    }
-    is_right && missing.is_empty()
-}
-
-fn report_missing_sides(checker: &mut Checker<'_>, missing: &[&str], domain: &tree::Domain) {
-    let list = missing.join(", ");
-    checker.report(
-        Diagnostic::error(M001, format!("nothing says what happens at {list}"))
-            .at(domain.shape.span, "sides of this domain without a boundary")
-            .found(format!("no boundary for {list}"))
-            .expected("one boundary for every side")
-            .help(format!("add for example `boundary {list} reflect`")),
-    );
-}
-
-fn check_periodic(
-    checker: &mut Checker<'_>,
-    set: &[Option<(Side, Span)>; 2],
-    axis: &Axis,
-    names: [&str; 2],
-) -> bool {
-    let [Some((low, low_span)), Some((high, high_span))] = *set else { return true };
-    if (low == Side::Periodic) == (high == Side::Periodic) {
-        return true;
-    }
-    let (place, other) = if low == Side::Periodic { (low_span, high_span) } else { (high_span, low_span) };
-    checker.report(
-        Diagnostic::error(M007, format!("`periodic` joins {} and {}: both or none", names[0], names[1]))
-            .at(place, "periodic")
-            .also(other, "not periodic")
-            .also(axis.span, "of this axis")
-            .found("one periodic side")
-            .expected("two periodic sides"),
-    );
-    false
-}
-
-/// `Some(None)`: there is no flow statement, and nothing flows.
-pub(super) fn flow<'a>(
-    checker: &mut Checker<'a>,
-    statements: &Statements<'a>,
-) -> Option<Option<Spanned<[f64; 3]>>> {
-    let Some((span, statement)) = statements.flow else { return Some(None) };
-    checker.word(&statement.kind, "a kind of flow", &[("uniform", ())])?;
-    let Some(argument) = &statement.argument else {
-        checker.report(
-            Diagnostic::error(M004, "`flow uniform` needs a velocity")
-                .at(statement.kind.span, "no velocity after this")
-                .found("the end of the statement")
-                .expected("a velocity, such as `1 m/d`"),
-        );
-        return None;
-    };
-    let velocity = checker.vector(argument, "the velocity", Dimension::VELOCITY)?;
-    Some(Some(Spanned::new(velocity, span)))
-}
-
-pub(super) fn dispersion<'a>(
-    checker: &mut Checker<'a>,
-    statements: &Statements<'a>,
-) -> Option<Option<Spanned<[[f64; 3]; 3]>>> {
-    let Some((span, written)) = statements.dispersion else { return Some(None) };
-    let indices: Vec<usize> = checker.axes.iter().map(|(_, index)| *index).collect();
-    let rows = tuple_parts(written);
-    let mut tensor = [[0.0; 3]; 3];
-    let is_tensor = rows.iter().any(|row| matches!(row.kind, tree::ExprKind::Tuple(_)));
-    if rows.len() == 1 {
-        let value = checker.slot(written, "the dispersion coefficient", Dimension::DISPERSION)?.value;
-        indices.iter().for_each(|&index| tensor[index][index] = value);
-    } else if is_tensor {
-        read_tensor(checker, written, &rows, &indices, &mut tensor)?;
-    } else {
-        let diagonal = checker.vector(written, "a diagonal dispersion tensor", Dimension::DISPERSION)?;
-        indices.iter().for_each(|&index| tensor[index][index] = diagonal[index]);
-    }
-    check_tensor(checker, written, &tensor)?;
-    Some(Some(Spanned::new(tensor, span)))
-}
-
-fn read_tensor<'a>(
-    checker: &mut Checker<'a>,
-    written: &'a tree::Expr,
-    rows: &[&'a tree::Expr],
-    indices: &[usize],
-    tensor: &mut [[f64; 3]; 3],
-) -> Option<()> {
-    if rows.len() != indices.len() {
-        checker.report(
-            Diagnostic::error(D009, "a dispersion tensor has a row for each axis of the domain")
-                .at(written.span, format!("{} rows here", rows.len()))
-                .found(format!("{} rows", rows.len()))
-                .expected(format!("{} rows", indices.len())),
-        );
-        return None;
-    }
-    let mut is_right = true;
-    for (row, &index) in rows.iter().zip(indices) {
-        match checker.vector(row, "a row of the dispersion tensor", Dimension::DISPERSION) {
-            Some(values) => tensor[index] = values,
-            None => is_right = false,
-        }
-    }
-    is_right.then_some(())
-}
-
-/// A dispersion tensor is symmetric and has no negative eigenvalue.
-fn check_tensor(checker: &mut Checker<'_>, written: &tree::Expr, tensor: &[[f64; 3]; 3]) -> Option<()> {
-    let matrix = nalgebra::Matrix3::from_fn(|row, column| tensor[row][column]);
-    let largest = matrix.amax();
-    let is_symmetric = (matrix - matrix.transpose()).amax() <= 1e-12 * largest;
-    let smallest = if is_symmetric { matrix.symmetric_eigenvalues().min() } else { 0.0 };
-    let (label, found) = if !is_symmetric {
-        ("it is not symmetric".to_owned(), "a tensor that is not symmetric".to_owned())
-    } else if smallest < -1e-12 * largest {
-        let found = format!("the negative eigenvalue {} m^2/s", precise(smallest));
-        (format!("it has {found}"), found)
-    } else {
-        return Some(());
-    };
-    checker.report(
-        Diagnostic::error(M008, "this is no dispersion tensor")
-            .at(written.span, label)
-            .found(found)
-            .expected("a symmetric tensor without negative eigenvalues; one value is not negative"),
-    );
-    None
 }
 
 /// `Some(None)`: there is no `average` statement.

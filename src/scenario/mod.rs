@@ -29,6 +29,7 @@ mod scope;
 mod settings;
 mod slot;
 pub mod sweep;
+pub mod transport;
 mod unused;
 mod used;
 mod zones;
@@ -36,8 +37,9 @@ mod zones;
 use crate::source::{Span, Spanned};
 use crate::units::Dimension;
 use expression::Expr;
+use transport::{Auto, Dispersion, Flow, Patch, Shares, Source};
 
-pub use choice::{Activity, Integrator, OutputKind, Placement, Side, Splitting};
+pub use choice::{Activity, Covariance, Integrator, OutputKind, Placement, Side, Splitting};
 pub use collect::resolve;
 pub use geometry::MAX_BINS;
 pub use measure::{Fact, Field, FieldTarget, Norm, Scalar};
@@ -71,10 +73,13 @@ pub struct Scenario {
     pub reactions: Vec<Reaction>,
     pub chemistry: Chemistry,
     pub domain: Domain,
-    /// Velocity in the resting frame, m/s; absent without a `flow` statement.
-    pub flow: Option<Spanned<[f64; 3]>>,
-    /// Dispersion tensor, m²/s; absent without a `dispersion` statement.
-    pub dispersion: Option<Spanned<[[f64; 3]; 3]>>,
+    /// Porosity over the place; absent without a `medium` statement.
+    pub medium: Option<Spanned<Expr>>,
+    /// Absent without a `flow` statement.
+    pub flow: Option<Spanned<Flow>>,
+    /// Absent without a `dispersion` statement.
+    pub dispersion: Option<Spanned<Dispersion>>,
+    pub sources: Vec<Source>,
     pub mixing: Option<Mixing>,
     /// Bins of the averages, one count per axis of the domain.
     pub bins: Option<Spanned<Vec<usize>>>,
@@ -98,10 +103,22 @@ impl Scenario {
 
     /// Whether fluid, frame or exchange between zones could carry anything away from where it is.
     pub fn has_transport(&self) -> bool {
-        let flows = self.flow.as_ref().is_some_and(|flow| flow.value.iter().any(|v| *v != 0.0));
-        let mut entries = self.dispersion.iter().flat_map(|tensor| tensor.value.iter().flatten());
+        let flows = match self.flow.as_ref().map(|flow| &flow.value) {
+            None => false,
+            Some(Flow::Uniform(velocity)) => velocity.iter().any(|v| *v != 0.0),
+            Some(Flow::Expression(_) | Flow::Darcy(_)) => true,
+        };
+        let disperses = match self.dispersion.as_ref().map(|dispersion| &dispersion.value) {
+            None => false,
+            Some(Dispersion::Tensor(tensor)) => tensor.iter().flatten().any(|entry| *entry != 0.0),
+            Some(Dispersion::Isotropic(_)) => true,
+            Some(Dispersion::Parts { longitudinal, transverse, transverse_vertical, molecular }) => {
+                let along = [longitudinal, transverse, transverse_vertical].iter().any(|part| **part != 0.0);
+                *molecular != 0.0 || (along && flows)
+            }
+        };
         let is_moving = self.domain.frame.iter().any(|v| *v != 0.0);
-        flows || is_moving || self.mixing.is_some() || entries.any(|entry| *entry != 0.0)
+        flows || is_moving || self.mixing.is_some() || disperses
     }
 }
 
@@ -136,6 +153,12 @@ pub struct Species {
     pub charge: Option<f64>,
     /// Ion-size parameter å, m.
     pub ion_size: Option<f64>,
+    /// Total over mobile concentration.
+    pub retardation: f64,
+    /// Molecular diffusion of its own, m²/s.
+    pub diffusion: Option<f64>,
+    /// Where either of the two is given.
+    pub own_transport: Option<Span>,
 }
 
 /// One direction of a reaction: `A <-> B @ forward …, backward …` makes two of these.
@@ -192,6 +215,8 @@ pub struct Axis {
     pub high: f64,
     pub low_side: Side,
     pub high_side: Side,
+    /// Of the lower and the upper side: parts first, what is left of it last.
+    pub patches: [Vec<Patch>; 2],
     /// Where the `boundary` statements name them.
     pub low_side_span: Span,
     pub high_side_span: Span,
@@ -217,16 +242,21 @@ pub struct Zone {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Particles {
     pub span: Span,
+    pub kind_span: Span,
     pub count: u64,
     pub count_span: Span,
     pub placement: Placement,
+    /// Of particles that carry mass; absent for fluid.
+    pub shares: Option<Shares>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
     pub span: Span,
     pub duration: f64,
+    /// The whole duration where the plan chooses the step.
     pub step: f64,
+    pub auto: Option<Auto>,
     pub step_span: Span,
     pub are_normals_double: bool,
 }

@@ -1,12 +1,12 @@
-//! Species, reactions, mixing zones, particles and the run itself.
+//! Species and the run itself.
 
 use super::check::{Allow, Checker, label_circle};
-use super::choice::PLACEMENTS;
 use super::collect::Statements;
 use super::expression::{Expr, Type};
 use super::scope::Origin;
+use super::slot::Value;
 use super::slot::collect_names;
-use super::{Particles, Placement, Run, Species};
+use super::{Run, Species};
 use crate::diagnostic::codes::{D002, D005, D006, M001, M005, M009};
 use crate::diagnostic::{Diagnostic, precise};
 use crate::source::Span;
@@ -41,6 +41,7 @@ pub(super) fn species<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>
     for idx in 0..initials.len() {
         initial_of(checker, &assigned, &mut initials, &mut running, idx);
     }
+    infer_dimensions(checker, statements);
     spread_dimensions(checker, statements);
     let list = statements.species.iter().enumerate().map(|(idx, written)| {
         let dimension = checker.species_dimensions[idx].unwrap_or(Dimension::MOLAR_CONCENTRATION);
@@ -59,6 +60,9 @@ pub(super) fn species<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>
             is_mineral: properties[idx].is_mineral,
             charge: properties[idx].charge,
             ion_size: properties[idx].ion_size,
+            retardation: properties[idx].retardation.unwrap_or(1.0),
+            diffusion: properties[idx].diffusion,
+            own_transport: properties[idx].own_transport,
         })
     });
     SpeciesList { list: list.collect() }
@@ -196,6 +200,30 @@ fn initial_of<'a>(
     checker.is_initial_wrong |= matches!(initials[idx], Initial::Wrong);
 }
 
+/// A species without an initial concentration takes the dimension of what enters at a side, is held there or
+/// comes from a source. Mistakes in these values are told where they are read.
+fn infer_dimensions<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) {
+    let n_axes = checker.axes.len();
+    let at_sides = statements.boundaries.iter().flat_map(|it| &it.carried).map(|it| (it, true));
+    let of_sources = statements.sources.iter().flat_map(|(_, it)| &it.carried).map(|it| (it, false));
+    for (assignment, is_concentration) in at_sides.chain(of_sources) {
+        let Some(Origin::Species(idx)) = checker.scope.get(&assignment.name.value).map(|it| it.origin) else {
+            continue;
+        };
+        if checker.species_dimensions[idx].is_some() {
+            continue;
+        }
+        let Some(value) = checker.check(&assignment.value, Allow::PLACE) else { continue };
+        checker.species_dimensions[idx] = match value.kind {
+            Type::Number(dimension) if is_concentration => {
+                Some(dimension).filter(|dimension| dimension.is_concentration())
+            }
+            _ if is_concentration => None,
+            kind => super::transport::source::concentration_for(kind, n_axes),
+        };
+    }
+}
+
 /// A species without a dimension of its own takes that of its reaction's other species.
 fn spread_dimensions(checker: &mut Checker<'_>, statements: &Statements<'_>) {
     let members = |reaction: &tree::Reaction| -> Vec<(usize, Span)> {
@@ -233,19 +261,6 @@ fn spread_dimensions(checker: &mut Checker<'_>, statements: &Statements<'_>) {
     }
 }
 
-pub(super) fn particles<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> Option<Particles> {
-    let (span, written) = statements.particles?;
-    let kind = checker.word(&written.kind, "a kind of particle", &[("fluid", ())]);
-    let placement = match &written.placement {
-        Some(name) => checker.word(name, "a placement", PLACEMENTS),
-        None => Some(Placement::Random),
-    };
-    let count = checker.slot(&written.count, "the number of particles", Dimension::NONE)?;
-    let count_value = checker.count(count.value, "the number of particles", MAX_PARTICLES, count.span)?;
-    kind?;
-    Some(Particles { span, count: count_value, count_span: count.span, placement: placement? })
-}
-
 pub(super) fn run<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> Option<Run> {
     let (span, written) = statements.run?;
     let duration = checker.slot(&written.duration, "the duration", Dimension::TIME).and_then(|duration| {
@@ -253,7 +268,12 @@ pub(super) fn run<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) ->
         checker.require(duration.value > 0.0, "the duration", found, "above zero", duration.span)?;
         Some(duration)
     });
+    let auto = written.step.as_ref().and_then(|step| super::transport::masses::auto(checker, step));
     let step = match &written.step {
+        Some(step) if auto.is_some() => {
+            auto.flatten()?;
+            duration.map(|duration| Value { value: duration.value, span: step.span })
+        }
         Some(step) => checker.slot(step, "the step", Dimension::TIME).and_then(|step| {
             let found = format!("{} s", precise(step.value));
             checker.require(step.value > 0.0, "the step", found, "above zero", step.span)?;
@@ -293,5 +313,12 @@ pub(super) fn run<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) ->
         return None;
     }
     is_right.then_some(())?;
-    Some(Run { span, duration: duration.value, step: step.value, step_span: step.span, are_normals_double })
+    Some(Run {
+        span,
+        duration: duration.value,
+        step: step.value,
+        step_span: step.span,
+        auto: auto.flatten(),
+        are_normals_double,
+    })
 }

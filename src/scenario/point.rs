@@ -32,7 +32,8 @@ impl Replaced {
                 }
                 Target::Particles => {
                     let written = statements.particles.map(|(_, particles)| particles.clone());
-                    replaced.particles = written.map(|written| tree::Particles { count: value, ..written });
+                    replaced.particles =
+                        written.map(|written| tree::Particles { count: tree::Count::All(value), ..written });
                 }
                 Target::Step => {
                     let written = statements.run.map(|(_, run)| run.clone());

@@ -6,6 +6,7 @@
 use super::check::Checker;
 use crate::diagnostic::codes::{M001, M002};
 use crate::diagnostic::{Diagnostic, precise};
+use crate::source::Span;
 use crate::syntax::tree;
 use crate::units::Dimension;
 
@@ -16,6 +17,9 @@ pub(super) struct Properties {
     pub is_mineral: bool,
     pub charge: Option<f64>,
     pub ion_size: Option<f64>,
+    pub retardation: Option<f64>,
+    pub diffusion: Option<f64>,
+    pub own_transport: Option<Span>,
 }
 
 /// Largest number of elementary charges, far above that of any ion in water.
@@ -30,6 +34,8 @@ enum Word {
     Mineral,
     Charge,
     IonSize,
+    Retardation,
+    Diffusion,
 }
 
 const WORDS: &[(&str, Word)] = &[
@@ -38,6 +44,8 @@ const WORDS: &[(&str, Word)] = &[
     ("mineral", Word::Mineral),
     ("charge", Word::Charge),
     ("ion_size", Word::IonSize),
+    ("retardation", Word::Retardation),
+    ("diffusion", Word::Diffusion),
 ];
 
 /// Reads what stands after the name; mistakes are reported and count as not written.
@@ -58,12 +66,17 @@ pub(super) fn properties<'a>(checker: &mut Checker<'a>, species: &'a tree::Speci
             continue;
         }
         seen.push((word, &qualifier.name));
+        if matches!(word, Word::Retardation | Word::Diffusion) {
+            found.own_transport.get_or_insert(qualifier.name.span);
+        }
         match word {
             Word::Immobile => found.is_immobile = true,
             Word::Mobile => {}
             Word::Mineral => (found.is_immobile, found.is_mineral) = (true, true),
             Word::Charge => found.charge = charge(checker, qualifier),
             Word::IonSize => found.ion_size = ion_size(checker, qualifier),
+            Word::Retardation => found.retardation = retardation(checker, qualifier),
+            Word::Diffusion => found.diffusion = diffusion(checker, qualifier),
         }
     }
     found
@@ -92,6 +105,30 @@ fn ion_size<'a>(checker: &mut Checker<'a>, qualifier: &'a tree::Qualifier) -> Op
     let rule = format!("above zero, at most {} m", precise(MAX_ION_SIZE));
     checker.require(is_fine, "an ion size", format!("{} m", precise(size.value)), &rule, size.span)?;
     Some(size.value)
+}
+
+fn retardation<'a>(checker: &mut Checker<'a>, qualifier: &'a tree::Qualifier) -> Option<f64> {
+    let example = "retardation 2";
+    let value = qualifier.value.as_ref().or_else(|| without_value(checker, &qualifier.name, example))?;
+    let factor = checker.slot(value, "a retardation factor", Dimension::NONE)?;
+    let is_fine = factor.value >= 1.0;
+    checker.require(is_fine, "a retardation factor", precise(factor.value), "1 or more", factor.span)?;
+    Some(factor.value)
+}
+
+fn diffusion<'a>(checker: &mut Checker<'a>, qualifier: &'a tree::Qualifier) -> Option<f64> {
+    let example = "diffusion 1e-9 m^2/s";
+    let value = qualifier.value.as_ref().or_else(|| without_value(checker, &qualifier.name, example))?;
+    let diffusion = checker.slot(value, "a diffusion coefficient", Dimension::DISPERSION)?;
+    let found = format!("{} m^2/s", precise(diffusion.value));
+    checker.require(
+        diffusion.value >= 0.0,
+        "a diffusion coefficient",
+        found,
+        "zero or more",
+        diffusion.span,
+    )?;
+    Some(diffusion.value)
 }
 
 fn without_value<'a>(checker: &mut Checker<'a>, name: &tree::Name, example: &str) -> Option<&'a tree::Expr> {

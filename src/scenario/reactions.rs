@@ -164,7 +164,8 @@ fn check_sharing(checker: &mut Checker<'_>, statements: &Statements<'_>, all: &[
 /// Whether what stays in its place has one, and whether what reacts in equilibrium moves together.
 pub(super) fn check_places(checker: &mut Checker<'_>, scenario: &Scenario) {
     check_charges(checker, scenario);
-    if !scenario.has_transport() {
+    // What masses do with reactions is told elsewhere; they need no bins to rest.
+    if !scenario.has_transport() || scenario.particles.shares.is_some() {
         return;
     }
     let word = |species: &super::Species| if species.is_mineral { "mineral" } else { "immobile" };

@@ -132,8 +132,7 @@ fn shrink(plan: &mut Plan, particles: u64) {
     let n_bins: u64 = plan.axes.iter().map(|axis| axis.bins as u64).product();
     let needed = if n_bins > 1 { n_bins.saturating_mul(PER_BIN) } else { 1 };
     let count = particles.max(needed).min(plan.particles.count);
-    plan.particles.volume *= plan.particles.count as f64 / count as f64;
-    plan.particles.count = count;
+    plan.set_count(count);
 }
 
 /// Exact for what numbers can hold.

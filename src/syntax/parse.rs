@@ -69,8 +69,9 @@ impl LostBody {
     fn follow(&mut self, lexed: Lexed, chunk: &Chunk) {
         let keyword = lexed.slice(chunk.first);
         if is_statement_keyword(keyword) {
-            self.is_inside =
-                keyword == "mixing" && !(chunk.first..chunk.end).any(|idx| lexed.slice(idx) == "{");
+            let has = |word: &str| (chunk.first..chunk.end).any(|idx| lexed.slice(idx) == word);
+            let has_body = keyword == "mixing" || (keyword == "flow" && has("darcy"));
+            self.is_inside = has_body && !has("{");
         }
     }
 }

@@ -3,7 +3,12 @@
 //! Owns the shapes; `parse` builds them, `format` prints them. May use `source`.
 //! It deliberately knows no physics: a unit is text here, a species is a name.
 
+mod transport;
+
 use crate::source::{Span, Spanned};
+pub use transport::{
+    Boundary, DarcyEntry, DarcyKind, Dispersion, Flow, FlowArgument, RegionArgument, Source, Well,
+};
 
 /// A name with its place.
 pub type Name = Spanned<String>;
@@ -81,12 +86,16 @@ pub enum StatementKind {
     Chemistry(Vec<Field>),
     /// `domain line x = 0 m .. 1 m, frame moving v`
     Domain(Domain),
-    /// `boundary left, right reflect`
+    /// `boundary left, right reflect`, `boundary left y = 1 m .. 2 m inflow A = 1 mg/L`
     Boundary(Boundary),
-    /// `flow uniform v`
+    /// `medium porosity 0.3`
+    Medium(Vec<Field>),
+    /// `flow uniform v`, `flow velocity = (u, v)`, `flow darcy { … }`
     Flow(Flow),
-    /// `dispersion D`; a scalar, a tuple (diagonal) or a tuple of tuples (tensor)
-    Dispersion(Expr),
+    /// `dispersion D`, or its parts: `dispersion longitudinal a, transverse b, molecular m`
+    Dispersion(Dispersion),
+    /// `source spill: A = 1 g/d at point(1 m, 2 m) during 0 .. 3 d`
+    Source(Source),
     /// `mixing zones { fast: fraction 0.5, rate instant … }`
     MixingZones(Vec<Zone>),
     /// `average bins 300` or `average bins 100 x 50`
@@ -290,21 +299,6 @@ pub struct Range {
 }
 
 #[derive(Debug, Clone, PartialEq)]
-pub struct Boundary {
-    /// `left`, `right`, `bottom`, `top`, `front`, `back`
-    pub sides: Vec<Name>,
-    /// A catalogue name: `reflect`, `open`, `periodic`.
-    pub kind: Name,
-}
-
-#[derive(Debug, Clone, PartialEq)]
-pub struct Flow {
-    /// A catalogue name: `uniform`.
-    pub kind: Name,
-    pub argument: Option<Expr>,
-}
-
-#[derive(Debug, Clone, PartialEq)]
 pub struct Zone {
     pub name: Name,
     /// `fraction e`, `rate e`, in the order written; `rate instant` has the plain name `instant`.
@@ -335,12 +329,19 @@ pub struct Assignment {
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Particles {
-    /// `fluid`
+    /// `fluid`, `mass`
     pub kind: Name,
-    /// A number, or a name of a dimensionless parameter.
-    pub count: Expr,
+    pub count: Count,
     /// A catalogue name: `stratified`, `random`.
     pub placement: Option<Name>,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum Count {
+    /// A number, or a name of a dimensionless parameter.
+    All(Expr),
+    /// `A 1000, B 2000`
+    Shares(Vec<Field>),
 }
 
 #[derive(Debug, Clone, PartialEq)]

@@ -17,8 +17,10 @@ pub const STATEMENT_KEYWORDS: &[&str] = &[
     "chemistry",
     "domain",
     "boundary",
+    "medium",
     "flow",
     "dispersion",
+    "source",
     "mixing",
     "average",
     "initial",
@@ -33,7 +35,7 @@ pub const STATEMENT_KEYWORDS: &[&str] = &[
 ];
 
 /// First words that the language description knows and this version does not run yet.
-pub const LATER_KEYWORDS: &[&str] = &["medium", "source", "kernel", "data"];
+pub const LATER_KEYWORDS: &[&str] = &["kernel", "data"];
 
 /// Statements whose body in braces may hold what looks like statements.
 pub const BODY_KEYWORDS: &[&str] = &["sweep"];
@@ -56,10 +58,27 @@ pub fn is_statement_keyword(word: &str) -> bool {
 pub fn clause_words(keyword: &str) -> &'static [&'static str] {
     match keyword {
         "param" => &["in"],
-        "species" => &["immobile", "mobile", "mineral", "charge", "ion_size"],
+        "species" => &["immobile", "mobile", "mineral", "charge", "ion_size", "retardation", "diffusion"],
         "reaction" => &["forward", "backward"],
         "chemistry" => &["tolerance", "floor", "order", "splitting", "activity", "integrator"],
         "domain" => &["frame", "moving"],
+        "boundary" => &["rate"],
+        "medium" => &["porosity"],
+        "flow" => &[
+            "head",
+            "flux",
+            "no_flow",
+            "periodic",
+            "conductivity",
+            "anisotropy",
+            "well",
+            "rate",
+            "screen",
+            "grid",
+            "at",
+        ],
+        "dispersion" => &["longitudinal", "transverse", "transverse_vertical", "molecular"],
+        "source" => &["at", "in", "along", "during"],
         "mixing" => &["zones", "fraction", "rate"],
         "run" => &["to", "step"],
         "output" => &["at", "every", "along", "on", "in"],

@@ -8,7 +8,7 @@ use super::failure::TableError;
 use super::schema::{self, Kind};
 use super::sheet::{ROW_GROUP, Sheet};
 use super::unit::{ValueUnit, value_unit};
-use crate::engine::snapshot::{MixingState, Snapshot, Values};
+use crate::engine::snapshot::{MixingState, Snapshot, Values, counts};
 use crate::plan::{Output, Plan, Quantity};
 use arrow_array::types::UInt16Type;
 use arrow_array::{
@@ -102,7 +102,8 @@ struct Block<'a> {
 impl Block<'_> {
     fn n_rows(&self) -> usize {
         match &self.snapshot.values {
-            Values::Binned { n_particles, .. } | Values::Covariance { n_particles, .. } => n_particles.len(),
+            Values::Binned { mean, .. } => mean[self.quantity_idx].len(),
+            Values::Covariance { n_particles, .. } => n_particles.len(),
             Values::Total { .. } | Values::Mixing(_) => 1,
             Values::Particles { concentrations, .. } => concentrations[self.quantity_idx].len(),
         }
@@ -116,15 +117,17 @@ impl Block<'_> {
             Values::Binned { mean, standard_error, n_particles } => {
                 columns.extend(self.bin_coordinates(rows.clone()));
                 columns.extend(self.names(rows.len()));
-                columns.push(self.values(&mean[q], rows.clone(), |row| n_particles[row] > 0));
+                let n_particles = counts(n_particles, mean[q].len(), q);
+                let is_known = |row: usize| n_particles[row] > 0 || self.plan.transport.is_some();
+                columns.push(self.values(&mean[q], rows.clone(), is_known));
                 columns.push(self.values(&standard_error[q], rows.clone(), |row| n_particles[row] > 1));
-                columns.push(counts(&n_particles[rows.clone()]));
+                columns.push(numbers(&n_particles[rows.clone()]));
             }
             Values::Covariance { covariance, n_particles } => {
                 columns.extend(self.bin_coordinates(rows.clone()));
                 columns.extend(self.names(rows.len()));
                 columns.push(self.values(&covariance[q], rows.clone(), |row| n_particles[row] > 1));
-                columns.push(counts(&n_particles[rows.clone()]));
+                columns.push(numbers(&n_particles[rows.clone()]));
             }
             Values::Total { amount } => {
                 columns.extend(self.names(1));
@@ -214,7 +217,7 @@ impl Block<'_> {
     }
 }
 
-fn counts(n_particles: &[u64]) -> ArrayRef {
+fn numbers(n_particles: &[u64]) -> ArrayRef {
     Arc::new(UInt64Array::from_iter_values(n_particles.iter().copied()))
 }
 
@@ -241,7 +244,8 @@ fn check_shape(plan: &Plan, output: &Output, snapshot: &Snapshot) -> Result<(), 
         Values::Binned { mean, standard_error, n_particles } => {
             is("quantities", n_quantities, mean.len())?;
             is("quantities", n_quantities, standard_error.len())?;
-            is("bins", n_bins, n_particles.len())?;
+            let n_counts = if n_particles.len() == n_bins { n_bins } else { n_bins * n_quantities };
+            is("bins", n_counts, n_particles.len())?;
             all("bins", n_bins, mean)?;
             all("bins", n_bins, standard_error)
         }

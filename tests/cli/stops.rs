@@ -112,3 +112,36 @@ fn reactions_that_cannot_be_followed_show_the_line_of_their_rate() {
         assert!(lines.iter().all(|line| shown.contains(line)), "{message}");
     }
 }
+
+/// A flow that cannot be solved for is shown at its block; with the bounds that the help asks for it runs.
+#[test]
+fn a_flow_without_a_solution_shows_its_block() {
+    let scene = |conductivity: &str| {
+        format!(
+            "lamella 1\nspecies A\ndomain rect x = 0 .. 100 m, y = 0 .. 40 m\nboundary left inflow A = 1 mol/m^3\n\
+             boundary right outflow\nboundary bottom, top reflect\nflow darcy {{\n  head left 101 m, right 100 m\n  \
+             no_flow bottom, top\n  conductivity {conductivity}\n  grid 100 x 40\n}}\n\
+             dispersion longitudinal 0.1 m, transverse 0.01 m, molecular 1e-9 m^2/s\nparticles mass 1000\n\
+             run to 1 d, step 0.5 d\noutput total A at t = 1 d\n"
+        )
+    };
+    let field = |length: &str| {
+        format!("lognormal(geometric_mean = 10 m/d, variance = 1, covariance = gaussian({length}, {length}))")
+    };
+    let decades = |low: &str| format!("if x > 50 m then {low} else 1e8 m/d");
+    let cases = [
+        (decades("1e-12 m/d"), "did not converge", decades("max(1e-12 m/d, 1e6 m/d)")),
+        (field("1e6 m"), "periodic box", field("5 m")),
+    ];
+    for (wrong, why, right) in cases {
+        let folder = Folder::new();
+        folder.write("s.lam", scene(&wrong));
+        let message = stop(&folder);
+        assert_eq!(message["code"], "R108", "{message}");
+        assert!(message["message"].as_str().is_some_and(|text| text.contains(why)), "{message}");
+        assert_eq!(place(&message), (7, "this flow"));
+        assert!(help(&message).contains("`max` and `min`"), "{message}");
+        folder.write("s.lam", scene(&right));
+        folder.lamella(&["run", "s.lam", "--out", "right"]).exits(0);
+    }
+}

@@ -9,7 +9,7 @@ use super::super::program::unsound;
 use super::super::snapshot::{Snapshot, Values};
 use super::flock::{self, Flock};
 use super::world::Site;
-use crate::maths::exact::{Quanta, Sum};
+use crate::maths::exact::{MOST_TERMS, Quanta, Sum};
 use crate::plan::{Output, OutputKind, Quantity};
 use crate::state::grid::Grid;
 use crate::state::particles::CHUNK;
@@ -56,7 +56,7 @@ impl<const D: usize> Scene<'_, D> {
             (0..D).map(|axis| (self.site.high[axis] - self.site.low[axis]) / bins[axis] as f64).product();
         let mut mean = Vec::new();
         let mut standard_error = Vec::new();
-        let mut n_particles = vec![0_u64; grid.n_bins()];
+        let mut n_particles = Vec::new();
         for population in self.populations(output) {
             let sums =
                 population.map_or_else(|| vec![Cell::default(); grid.n_slots()], |p| self.sums(p, &grid));
@@ -65,7 +65,7 @@ impl<const D: usize> Scene<'_, D> {
             mean.push((0..grid.n_bins()).map(|bin| sums[bin].mass.value() * per(bin)).collect());
             standard_error
                 .push((0..grid.n_bins()).map(|bin| sums[bin].square.value().sqrt() * per(bin)).collect());
-            n_particles.iter_mut().zip(&sums).for_each(|(n, cell)| *n += cell.n);
+            n_particles.extend(sums[..grid.n_bins()].iter().map(|cell| cell.n));
         }
         Ok(Values::Binned { mean, standard_error, n_particles })
     }
@@ -78,7 +78,7 @@ impl<const D: usize> Scene<'_, D> {
         let per_group = flocks.len().div_ceil(n_groups).max(1);
         let groups: Vec<&[&Flock<D>]> = flocks.chunks(per_group).collect();
         let largest = self.units.iter().fold(0.0, |a: f64, &b| a.max(b));
-        let square = Quanta::new(largest * largest, 1 << 40);
+        let square = Quanta::new(largest * largest, MOST_TERMS);
         let partial = parallel::map(groups.len(), &|group| {
             let mut cells = vec![Cell::default(); grid.n_slots()];
             let mut slots = [0_i32; CHUNK];

@@ -11,12 +11,37 @@ pub enum Place<const D: usize> {
     Point([f64; D]),
     Line([f64; D], [f64; D]),
     Box([f64; D], [f64; D]),
-    /// Centre and standard deviations.
-    Gaussian([f64; D], [f64; D]),
+    /// Centre, standard deviations, and what becomes of tails beyond the sides.
+    Gaussian([f64; D], [f64; D], [Tail; D]),
     Cells(Cells<D>),
     Faces(Faces<D>),
     /// One place per particle.
     List(Vec<[f64; D]>),
+}
+
+/// What becomes of what lies beyond the two sides of an axis: it is mirrored where there is a wall, and comes in
+/// again at the other side where they are periodic.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Tail {
+    pub low: Option<f64>,
+    pub high: Option<f64>,
+    pub is_periodic: bool,
+}
+
+impl Tail {
+    fn folded(self, x: f64) -> f64 {
+        match (self.low, self.high) {
+            (Some(low), Some(high)) => {
+                let width = high - low;
+                let period = if self.is_periodic { width } else { 2.0 * width };
+                let rest = (x - low) - period * ((x - low) / period).floor();
+                low + if rest > width { period - rest } else { rest }
+            }
+            (Some(low), None) if x < low => 2.0 * low - x,
+            (None, Some(high)) if x > high => 2.0 * high - x,
+            _ => x,
+        }
+    }
 }
 
 /// Equal cells with a mass each.
@@ -46,12 +71,16 @@ impl<const D: usize> Cells<D> {
         let volume: f64 = width.iter().product();
         let n_cells: usize = n.iter().product();
         let mut cells = Self { low, width, n, cumulative: Vec::with_capacity(n_cells) };
-        let mut sum = 0.0;
+        // A million roundings would show in the total: what each of them loses is kept.
+        let (mut sum, mut lost) = (0.0_f64, 0.0_f64);
         for first in (0..n_cells).step_by(4096) {
             let centres: Vec<[f64; D]> =
                 (first..(first + 4096).min(n_cells)).map(|cell| cells.inside(cell, [0.5; D])).collect();
             for mass in mass(&centres) {
-                sum += mass * volume;
+                let term = mass * volume - lost;
+                let next = sum + term;
+                lost = (next - sum) - term;
+                sum = next;
                 cells.cumulative.push(sum);
             }
         }
@@ -124,9 +153,9 @@ impl<const D: usize> Place<D> {
             Self::Point(place) => *place,
             Self::Line(from, to) => std::array::from_fn(|axis| from[axis] + share * (to[axis] - from[axis])),
             Self::Box(low, high) => between(low, high),
-            Self::Gaussian(centre, deviation) => {
+            Self::Gaussian(centre, deviation, tails) => {
                 let normals = normals(uniforms);
-                std::array::from_fn(|axis| centre[axis] + deviation[axis] * normals[axis])
+                std::array::from_fn(|axis| tails[axis].folded(centre[axis] + deviation[axis] * normals[axis]))
             }
             Self::Cells(cells) => {
                 let (cell, part) = find(&cells.cumulative, share * cells.total());
@@ -158,6 +187,20 @@ fn normals(uniforms: &[f64; 8]) -> [f64; 4] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn tails_are_folded_into_the_domain() {
+        let wall = Tail { low: Some(1.0), high: Some(3.0), is_periodic: false };
+        for (x, folded) in [(1.5, 1.5), (0.5, 1.5), (3.25, 2.75), (6.0, 2.0), (-3.5, 1.5)] {
+            assert!((wall.folded(x) - folded).abs() < 1e-15, "{x} is folded to {}", wall.folded(x));
+        }
+        let around = Tail { is_periodic: true, ..wall };
+        for (x, folded) in [(1.5, 1.5), (0.5, 2.5), (3.25, 1.25), (-3.5, 2.5)] {
+            assert!((around.folded(x) - folded).abs() < 1e-15, "{x} comes in at {}", around.folded(x));
+        }
+        let half = Tail { high: None, ..wall };
+        assert_eq!((half.folded(0.5), half.folded(9.0)), (1.5, 9.0));
+    }
 
     #[test]
     fn shares_follow_the_mass() {

@@ -23,7 +23,7 @@ use super::release::{Birth, Kind, Release, Window};
 use super::world::Site;
 use crate::chemistry::Work;
 use crate::flow::build;
-use crate::maths::exact::Quanta;
+use crate::maths::exact::{MOST_TERMS, Quanta};
 use crate::maths::wide::Width;
 use crate::plan::Plan;
 use crate::plan::tape::{Operation, Tape};
@@ -231,7 +231,7 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
         let units: Vec<f64> = releases.iter().map(|release| release.unit).collect();
         let largest = units.iter().fold(0.0, |a: f64, &b| a.max(b));
         // Particles that are refilled count again and again; sums are over what happened, too.
-        let quanta = Quanta::new(largest, 1 << 40);
+        let quanta = Quanta::new(largest, MOST_TERMS);
         Ok(Self {
             carriers: site.carriers(),
             book: Book::new(quanta, site.transport.populations.len()),

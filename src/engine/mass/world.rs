@@ -11,17 +11,21 @@ use super::super::track::noise::Draws;
 use super::super::track::tracker::Tracker;
 use super::super::track::walls::{self, Ends, Law, Wall};
 use super::entry::Entry;
-use super::place::{Cells, Faces, Place};
+use super::place::{Cells, Faces, Place, Tail};
 use super::release::{Kind, Release, Sampling};
 use crate::flow::FaceFlow;
 use crate::maths::wide::Width;
-use crate::plan::tape::Tape;
-use crate::plan::transport::{Region, SideRule, Source, Strength, Transport};
+use crate::plan::tape::{Operation, Tape};
+use crate::plan::transport::{Dispersion, Flow, Patch, Region, SideRule, Source, Strength, Transport};
 use crate::plan::{Normals, Placement, Plan};
 use std::sync::Arc;
 
 /// How much smaller a reservoir acts that is filled once a step, in standard deviations of a step.
 const RESERVOIR: f64 = 0.582_597_157_939_010_7;
+/// Parts along an axis that a side is cut into where what enters varies, with one and with two axes; a side that
+/// is kept at a concentration draws numbers for each of them in each step.
+const CUTS: [usize; 2] = [1024, 128];
+const HELD_CUTS: [usize; 2] = [64, 16];
 
 /// What the builders read.
 pub struct Site<'a, const D: usize> {
@@ -140,12 +144,24 @@ impl<'a, const D: usize> Site<'a, D> {
         }
         for axis in 0..D {
             for end in 0..2 {
-                for patch in &self.transport.sides[axis][end] {
-                    parts.extend(self.side(tracker, population, [axis, end], patch));
+                for idx in 0..self.transport.sides[axis][end].len() {
+                    parts.extend(self.side(tracker, population, [axis, end], idx));
                 }
             }
         }
         Ok(parts)
+    }
+
+    fn tail(&self, axis: usize) -> Tail {
+        let is = |end: usize, rule: SideRule| {
+            self.transport.sides[axis][end].iter().all(|patch| patch.rule == rule)
+        };
+        let at = |end: usize, at: f64| (!is(end, SideRule::Open)).then_some(at);
+        Tail {
+            low: at(0, self.low[axis]),
+            high: at(1, self.high[axis]),
+            is_periodic: is(0, SideRule::Periodic),
+        }
     }
 
     fn initial(&self, population: usize) -> Result<Part<D>, RunError> {
@@ -174,7 +190,9 @@ impl<'a, const D: usize> Site<'a, D> {
             Region::Point(at) => Place::Point(array(at)),
             Region::Line(from, to) => Place::Line(array(from), array(to)),
             Region::Box(low, high) => Place::Box(array(low), array(high)),
-            Region::Gaussian(centre, deviation) => Place::Gaussian(array(centre), array(deviation)),
+            Region::Gaussian(centre, deviation) => {
+                Place::Gaussian(array(centre), array(deviation), std::array::from_fn(|axis| self.tail(axis)))
+            }
             Region::Table(columns) => {
                 let n = columns.first().map_or(0, Vec::len);
                 Place::List((0..n).map(|row| std::array::from_fn(|axis| columns[axis][row])).collect())
@@ -249,8 +267,9 @@ impl<'a, const D: usize> Site<'a, D> {
         tracker: &Tracker<D, M>,
         population: usize,
         [axis, end]: [usize; 2],
-        patch: &crate::plan::transport::Patch,
+        idx: usize,
     ) -> Vec<Part<D>> {
+        let patch = &self.transport.sides[axis][end][idx];
         let of = &self.transport.populations[population];
         let (tapes, is_held) = match &patch.rule {
             SideRule::Inflow(tapes) => (tapes, false),
@@ -263,7 +282,7 @@ impl<'a, const D: usize> Site<'a, D> {
         let name = format!("side {}", 2 * axis + end);
         let mut flux = Vec::new();
         let mut parts = Vec::new();
-        for (low, high) in self.faces(axis, end, patch) {
+        for (low, high) in self.faces([axis, end], idx, (tape, if is_held { HELD_CUTS } else { CUTS })) {
             let centre: [f64; D] = std::array::from_fn(|other| 0.5 * (low[other] + high[other]));
             let area: f64 =
                 (0..D).filter(|&other| other != axis).map(|other| high[other] - low[other]).product();
@@ -301,33 +320,67 @@ impl<'a, const D: usize> Site<'a, D> {
         parts
     }
 
-    /// Rectangles of a patch in which the flow is smooth: the faces of cells, or the patch itself.
+    /// Rectangles of a patch that no earlier one holds, small enough to be looked at in the middle: what enters
+    /// is a tape, with the cuts that it is worth.
     fn faces(
         &self,
-        axis: usize,
-        end: usize,
-        patch: &crate::plan::transport::Patch,
+        [axis, end]: [usize; 2],
+        idx: usize,
+        varied: (&Tape, [usize; 2]),
     ) -> Vec<([f64; D], [f64; D])> {
+        let (earlier, rest) = self.transport.sides[axis][end].split_at(idx);
+        let Some(patch) = rest.first() else { return Vec::new() };
         let at = if end == 0 { self.low[axis] } else { self.high[axis] };
         let mut faces: Vec<([f64; D], [f64; D])> = vec![([at; D], [at; D])];
         for other in (0..D).filter(|&other| other != axis) {
-            let limits = (patch.low[other].max(self.low[other]), patch.high[other].min(self.high[other]));
-            let index = self.plan.axes[other].index;
-            let whole = [self.low[other], self.high[other]];
-            let edges: &[f64] = self.flow.as_ref().map_or(&whole, |flow| &flow.cells.edges()[index]);
-            let mut cut = Vec::new();
-            for pair in edges.windows(2) {
-                let (low, high) = (pair[0].max(limits.0), pair[1].min(limits.1));
-                if low < high {
-                    for (mut from, mut to) in faces.iter().copied() {
-                        (from[other], to[other]) = (low, high);
-                        cut.push((from, to));
-                    }
-                }
-            }
-            faces = cut;
+            let low = patch.low[other].max(self.low[other]);
+            let high = patch.high[other].min(self.high[other]);
+            let edges = self.edges(other, (low, high), earlier, varied);
+            let cut = |(from, to): ([f64; D], [f64; D])| {
+                let pairs: Vec<_> = edges.windows(2).map(|pair| (pair[0], pair[1])).collect();
+                pairs.into_iter().map(move |(low, high)| {
+                    let (mut from, mut to) = (from, to);
+                    (from[other], to[other]) = (low, high);
+                    (from, to)
+                })
+            };
+            faces = faces.into_iter().flat_map(cut).collect();
         }
+        let is_free = |(low, high): &([f64; D], [f64; D])| {
+            let holds = |patch: &Patch, other: usize| {
+                let centre = 0.5 * (low[other] + high[other]);
+                other == axis || (patch.low[other] <= centre && centre <= patch.high[other])
+            };
+            !earlier.iter().any(|patch| (0..D).all(|other| holds(patch, other)))
+        };
+        faces.retain(is_free);
         faces
+    }
+
+    /// Where a side is cut along an axis: at faces of cells, at limits of other patches, and evenly where
+    /// something varies.
+    fn edges(
+        &self,
+        other: usize,
+        (low, high): (f64, f64),
+        earlier: &[Patch],
+        (tape, cuts): (&Tape, [usize; 2]),
+    ) -> Vec<f64> {
+        let is_constant = |tape: &Tape| matches!(tape.operations[..], [Operation::Constant(_)]);
+        let is_even = is_constant(tape)
+            && is_constant(&self.transport.porosity)
+            && !matches!(self.transport.flow, Flow::Expression(_))
+            && !matches!(self.transport.dispersion, Dispersion::Isotropic(_));
+        let n = if is_even { 1 } else { cuts[usize::from(D > 2)] };
+        let mut edges: Vec<f64> = (0..n).map(|k| low + (high - low) * k as f64 / n as f64).collect();
+        edges.push(high);
+        let index = self.plan.axes[other].index;
+        edges.extend(self.flow.iter().flat_map(|flow| &flow.cells.edges()[index]));
+        edges.extend(earlier.iter().flat_map(|patch| [patch.low[other], patch.high[other]]));
+        edges.retain(|edge| (low..=high).contains(edge));
+        edges.sort_by(f64::total_cmp);
+        edges.dedup();
+        edges
     }
 }
 

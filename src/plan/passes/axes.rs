@@ -8,6 +8,10 @@ use crate::plan::tape::Operation;
 use crate::plan::{Output, OutputKind, Plan, Side};
 
 pub(super) fn run(draft: &mut Draft) {
+    // Sides, sources and flows of masses have places along every axis.
+    if draft.plan.transport.is_some() {
+        return;
+    }
     let mut axis_idx = 0;
     while axis_idx < draft.plan.axes.len() {
         if draft.plan.axes.len() > 1 && is_idle(&draft.plan, axis_idx) {

@@ -29,6 +29,9 @@ struct Affine {
 const TOLERANCE: f64 = 1e-12;
 
 pub(super) fn run(draft: &mut Draft) {
+    if draft.plan.transport.is_some() {
+        return;
+    }
     let forms: Vec<Affine> = draft.plan.components.iter().map(form_of).collect();
     let mut kept: Vec<usize> = Vec::new();
     // Of those that are kept, the ones that others may follow from.

@@ -2,6 +2,7 @@
 
 use super::{Draft, network};
 use crate::plan::evaluation::{Field, Scalar};
+use crate::plan::transport::{SideRule, Transport};
 use crate::plan::{Plan, Quantity};
 
 pub(super) fn run(draft: &mut Draft) {
@@ -85,6 +86,11 @@ pub(super) fn remove(draft: &mut Draft, is_read: &[bool]) {
         .collect();
     retain_by(&mut plan.components, &is_carried);
     let new_component = |old: usize| is_carried[..old].iter().filter(|is_carried| **is_carried).count();
+    if let Some(transport) = &mut plan.transport {
+        renumber_transport(transport, is_read, &renumbered);
+        let populations = transport.populations.iter();
+        plan.particles.count = populations.fold(0, |sum: u64, it| sum.saturating_add(it.count)).max(1);
+    }
     if let Some(chemistry) = &mut plan.chemistry {
         network::renumber(chemistry, &is_carried, &renumbered);
     }
@@ -107,6 +113,20 @@ pub(super) fn remove(draft: &mut Draft, is_read: &[bool]) {
     };
     plan.outputs.iter_mut().flat_map(|output| &mut output.quantities).for_each(quantity);
     renumber_evaluation(draft, &renumbered, &quantity);
+}
+
+/// Masses of species that nobody reads are not put in: no other species feels them.
+fn renumber_transport(transport: &mut Transport, is_read: &[bool], renumbered: &[Option<usize>]) {
+    transport.populations.retain(|population| is_read[population.species]);
+    transport.sources.retain(|source| is_read[source.species]);
+    let of = |species: &mut usize| *species = renumbered[*species].unwrap_or(0);
+    transport.populations.iter_mut().for_each(|population| of(&mut population.species));
+    transport.sources.iter_mut().for_each(|source| of(&mut source.species));
+    for patch in transport.sides.iter_mut().flatten().flatten() {
+        if let SideRule::Inflow(tapes) | SideRule::Held(tapes) = &mut patch.rule {
+            retain_by(tapes, is_read);
+        }
+    }
 }
 
 /// References to species that nobody observes go; measures keep pointing at the right ones.

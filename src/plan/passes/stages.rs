@@ -6,6 +6,10 @@ use crate::plan::{Plan, Stage, ZoneRate};
 
 pub(super) fn run(draft: &mut Draft) {
     let plan = &draft.plan;
+    if plan.transport.is_some() {
+        // Masses move and are looked at, whatever the scene.
+        return;
+    }
     let moves = plan.walk.drift.iter().chain(&plan.walk.spread).any(|entry| *entry != 0.0);
     let mixes = exchanges(plan);
     let reacts = plan.reacts_in_steps();

@@ -3,7 +3,8 @@
 //! Owns the walk. May use the tree. It deliberately knows no meaning: who visits says what to do.
 
 use crate::syntax::tree::{
-    Axis, Expr, ExprKind, Name, Range, Rate, StatementKind, SweepAxis, SweepEntry, SweepValue, Times,
+    Assignment, Axis, Count, DarcyEntry, DarcyKind, Dispersion, Expr, ExprKind, Field, FlowArgument, Name,
+    Range, Rate, RegionArgument, Source, StatementKind, SweepAxis, SweepEntry, SweepValue, Times,
 };
 
 /// What is done at each place.
@@ -34,22 +35,25 @@ pub(super) fn visit(kind: &mut StatementKind, visitor: &mut impl Visitor) {
                 Rate::Directions(list) => list.iter_mut().for_each(|it| expression(&mut it.value, visitor)),
             }
         }
-        StatementKind::Chemistry(list) => list.iter_mut().for_each(|it| expression(&mut it.value, visitor)),
+        StatementKind::Chemistry(list) | StatementKind::Medium(list) => fields(list, visitor),
         StatementKind::Domain(it) => {
             it.axes.iter_mut().for_each(|it| axis(it, visitor));
             it.frame.iter_mut().for_each(|it| expression(it, visitor));
         }
-        StatementKind::Flow(it) => it.argument.iter_mut().for_each(|it| expression(it, visitor)),
-        StatementKind::Dispersion(it) => expression(it, visitor),
+        StatementKind::Boundary(_)
+        | StatementKind::Flow(_)
+        | StatementKind::Dispersion(_)
+        | StatementKind::Source(_) => transport(kind, visitor),
         StatementKind::MixingZones(zones) => {
             let fields = zones.iter_mut().flat_map(|zone| &mut zone.fields);
             fields.for_each(|it| expression(&mut it.value, visitor));
         }
         StatementKind::Average(it) => expressions(&mut it.counts, visitor),
-        StatementKind::Initial(list) => {
-            list.iter_mut().for_each(|it| expression(&mut it.value, visitor));
-        }
-        StatementKind::Particles(it) => expression(&mut it.count, visitor),
+        StatementKind::Initial(list) => assignments(list, visitor),
+        StatementKind::Particles(it) => match &mut it.count {
+            Count::All(it) => expression(it, visitor),
+            Count::Shares(list) => fields(list, visitor),
+        },
         StatementKind::Run(it) => {
             expression(&mut it.duration, visitor);
             it.step.iter_mut().for_each(|it| expression(it, visitor));
@@ -76,10 +80,64 @@ pub(super) fn visit(kind: &mut StatementKind, visitor: &mut impl Visitor) {
         | StatementKind::Title(_)
         | StatementKind::Cite(_)
         | StatementKind::Seed(_)
-        | StatementKind::Boundary(_)
         | StatementKind::Use(_)
         | StatementKind::Report(_) => {}
     }
+}
+
+/// Sides, flow, dispersion and sources.
+fn transport(kind: &mut StatementKind, visitor: &mut impl Visitor) {
+    match kind {
+        StatementKind::Boundary(it) => {
+            it.patch.iter_mut().for_each(|it| axis(it, visitor));
+            assignments(&mut it.carried, visitor);
+            it.rate.iter_mut().for_each(|it| expression(&mut it.value, visitor));
+        }
+        StatementKind::Flow(it) => match &mut it.argument {
+            FlowArgument::None => {}
+            FlowArgument::Value(it) | FlowArgument::Assigned(it) => expression(it, visitor),
+            FlowArgument::Entries(list) => list.iter_mut().for_each(|it| darcy_entry(it, visitor)),
+        },
+        StatementKind::Dispersion(Dispersion::Value(it)) => expression(it, visitor),
+        StatementKind::Dispersion(Dispersion::Parts(list)) => fields(list, visitor),
+        StatementKind::Source(it) => source(it, visitor),
+        _ => {}
+    }
+}
+
+fn fields(list: &mut [Field], visitor: &mut impl Visitor) {
+    list.iter_mut().for_each(|it| expression(&mut it.value, visitor));
+}
+
+fn assignments(list: &mut [Assignment], visitor: &mut impl Visitor) {
+    list.iter_mut().for_each(|it| expression(&mut it.value, visitor));
+}
+
+fn darcy_entry(entry: &mut DarcyEntry, visitor: &mut impl Visitor) {
+    match &mut entry.kind {
+        DarcyKind::Head(list) | DarcyKind::Flux(list) => {
+            list.iter_mut().for_each(|(_, it)| expression(it, visitor));
+        }
+        DarcyKind::NoFlow(_) | DarcyKind::Periodic(_) => {}
+        DarcyKind::Conductivity(it) | DarcyKind::Anisotropy(it) => expression(it, visitor),
+        DarcyKind::Well(it) => {
+            expression(&mut it.at, visitor);
+            it.rate.iter_mut().for_each(|it| expression(it, visitor));
+            it.screen.iter_mut().for_each(|it| range(it, visitor));
+        }
+        DarcyKind::Grid(counts) => expressions(counts, visitor),
+    }
+}
+
+fn source(source: &mut Source, visitor: &mut impl Visitor) {
+    assignments(&mut source.carried, visitor);
+    for argument in &mut source.arguments {
+        match argument {
+            RegionArgument::Range(it) => range(it, visitor),
+            RegionArgument::Value(it) => expression(it, visitor),
+        }
+    }
+    source.during.iter_mut().for_each(|it| range(it, visitor));
 }
 
 fn sweep_entry(entry: &mut SweepEntry, visitor: &mut impl Visitor) {

@@ -8,6 +8,7 @@ mod expressions;
 mod quantity;
 mod statements;
 mod sweeps;
+mod transport;
 
 use super::climb::Built;
 use super::grammar::Rule;
@@ -140,10 +141,12 @@ fn is_keyword(rule: Rule) -> bool {
             | R::kw_chemistry
             | R::kw_mixing
             | R::kw_average
-    ) || matches!(
-        rule,
-        R::kw_initial | R::kw_particles | R::kw_run | R::kw_output | R::kw_reference | R::kw_measure
-    ) || matches!(rule, R::kw_use | R::kw_sweep | R::kw_report);
+    ) || matches!(rule, R::kw_medium | R::kw_source)
+        || matches!(
+            rule,
+            R::kw_initial | R::kw_particles | R::kw_run | R::kw_output | R::kw_reference | R::kw_measure
+        )
+        || matches!(rule, R::kw_use | R::kw_sweep | R::kw_report);
     let joins = matches!(
         rule,
         R::kw_zones
@@ -165,7 +168,12 @@ fn is_keyword(rule: Rule) -> bool {
         rule,
         R::kw_expect | R::kw_factor | R::kw_against | R::kw_replicates | R::kw_common | R::less
     );
-    begins || joins
+    let of_transport =
+        matches!(
+            rule,
+            R::kw_head | R::kw_flux | R::kw_no_flow | R::kw_periodic | R::kw_conductivity | R::kw_anisotropy
+        ) || matches!(rule, R::kw_well | R::kw_rate | R::kw_screen | R::kw_grid | R::kw_during);
+    begins || joins || of_transport
 }
 
 fn span_at(place: Place, pair: &Pair<Rule>) -> Span {

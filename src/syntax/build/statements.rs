@@ -4,15 +4,15 @@
 //! It deliberately resolves no name; clauses in free order are counted, nothing else is checked.
 
 use super::expressions::{bare_number, operand};
-use super::{Parts, Place, span_at, spanned, sweeps};
+use super::{Parts, Place, span_at, spanned, sweeps, transport};
 use crate::diagnostic::{Diagnostic, codes};
 use crate::source::{Span, Spanned};
 use crate::syntax::climb::Built;
 use crate::syntax::grammar::Rule;
 use crate::syntax::tree::{
-    Arrow, Assignment, Average, Axis, Boundary, Domain, Expr, ExprKind, Field, Flow, Function, Let, Measure,
-    Output, Param, Particles, Qualifier, Rate, Reaction, Reference, Run, Species, StatementKind, Target,
-    Term, Times, UnaryOperator, Use, Zone,
+    Arrow, Assignment, Average, Axis, Count, Domain, Expr, ExprKind, Field, Function, Let, Measure, Output,
+    Param, Particles, Qualifier, Rate, Reaction, Reference, Run, Species, StatementKind, Target, Term, Times,
+    UnaryOperator, Use, Zone,
 };
 use pest::iterators::Pair;
 
@@ -40,14 +40,11 @@ pub fn kind(mut parts: Parts, rule: Rule) -> Built<StatementKind> {
         Rule::reaction => S::Reaction(reaction(parts)?),
         Rule::chemistry => S::Chemistry(each(parts, Rule::chemistry_setting, field)?),
         Rule::domain => S::Domain(domain(parts)?),
-        Rule::boundary => S::Boundary(Boundary {
-            sides: parts.names(Rule::side),
-            kind: parts.wrapped_name(Rule::boundary_kind)?,
-        }),
-        Rule::flow => {
-            S::Flow(Flow { kind: parts.wrapped_name(Rule::kind)?, argument: parts.optional_expression()? })
-        }
-        Rule::dispersion => S::Dispersion(parts.expression()?),
+        Rule::boundary => S::Boundary(transport::boundary(parts)?),
+        Rule::medium => S::Medium(each(parts, Rule::medium_part, field)?),
+        Rule::flow => S::Flow(transport::flow(parts)?),
+        Rule::dispersion => S::Dispersion(transport::dispersion(parts)?),
+        Rule::source => S::Source(transport::source(parts)?),
         Rule::mixing => S::MixingZones(each(parts, Rule::zone, zone)?),
         Rule::average => {
             S::Average(Average { kind: parts.wrapped_name(Rule::kind)?, counts: counts(parts)? })
@@ -94,7 +91,11 @@ fn species(parts: &mut Parts) -> Built<Species> {
     let name = parts.name()?;
     let mut qualifiers = each(parts, Rule::qualifier, qualifier)?;
     let doc = parts.optional_text()?;
-    qualifiers.extend(each(parts, Rule::qualifier, qualifier)?);
+    loop {
+        qualifiers.extend(each(parts, Rule::qualifier, qualifier)?);
+        let Some(pair) = parts.take(Rule::valued) else { break };
+        qualifiers.push(valued(&mut Parts::of(parts.place, pair))?);
+    }
     Ok(Species { name, qualifiers, doc })
 }
 
@@ -111,7 +112,16 @@ fn qualifier(parts: &mut Parts) -> Built<Qualifier> {
         let name = inner.need(Rule::ion_size_word)?;
         return Ok(Qualifier { name: spanned(place, &name), value: Some(inner.expression()?) });
     }
+    if let Some(pair) = parts.take(Rule::valued) {
+        return valued(&mut Parts::of(place, pair));
+    }
     Ok(Qualifier { name: parts.name()?, value: None })
+}
+
+/// `retardation 2`
+fn valued(parts: &mut Parts) -> Built<Qualifier> {
+    let name = parts.need(Rule::valued_word)?;
+    Ok(Qualifier { name: spanned(parts.place, &name), value: Some(parts.expression()?) })
 }
 
 /// `2`, `-1`: without a unit, since a further word may follow.
@@ -131,7 +141,7 @@ fn signed_number(place: Place, pair: Pair<Rule>) -> Built<Expr> {
 }
 
 /// Two words, the second a value: `rate 1 /d`, `tolerance 1e-6`.
-fn field(parts: &mut Parts) -> Built<Field> {
+pub fn field(parts: &mut Parts) -> Built<Field> {
     Ok(Field { name: parts.name()?, value: parts.expression()? })
 }
 
@@ -191,7 +201,7 @@ fn domain(parts: &mut Parts) -> Built<Domain> {
     Ok(Domain { shape, axes, frame: frame.value() })
 }
 
-fn axis(parts: &mut Parts) -> Built<Axis> {
+pub fn axis(parts: &mut Parts) -> Built<Axis> {
     let name = parts.need(Rule::axis_name)?;
     Ok(Axis { name: spanned(parts.place, &name), range: parts.range()? })
 }
@@ -202,7 +212,7 @@ fn zone(parts: &mut Parts) -> Built<Zone> {
     Ok(Zone { name, fields })
 }
 
-fn counts(parts: &mut Parts) -> Built<Vec<Expr>> {
+pub fn counts(parts: &mut Parts) -> Built<Vec<Expr>> {
     let pair = parts.need(Rule::counts)?;
     let mut parts = Parts::of(parts.place, pair);
     let mut counts = Vec::new();
@@ -221,14 +231,22 @@ fn count(place: Place, pair: Pair<Rule>) -> Built<Expr> {
     }
 }
 
-fn assignment(parts: &mut Parts) -> Built<Assignment> {
+pub fn assignment(parts: &mut Parts) -> Built<Assignment> {
     Ok(Assignment { name: parts.name()?, value: parts.expression()? })
 }
 
 fn particles(parts: &mut Parts) -> Built<Particles> {
     let kind = parts.wrapped_name(Rule::kind)?;
     let place = parts.place;
-    let count = count(place, parts.need(Rule::count)?)?;
+    let shares = each(parts, Rule::share, |parts| {
+        let name = parts.name()?;
+        let pair = parts.need(Rule::count)?;
+        Ok(Field { name, value: count(parts.place, pair)? })
+    })?;
+    let count = match shares.is_empty() {
+        true => Count::All(count(place, parts.need(Rule::count)?)?),
+        false => Count::Shares(shares),
+    };
     let placement = parts.take(Rule::placement).map(|pair| Parts::of(place, pair).name()).transpose()?;
     Ok(Particles { kind, count, placement })
 }
@@ -341,7 +359,7 @@ fn keyword_span(place: Place, pair: &Pair<Rule>) -> Span {
 }
 
 /// A clause that may stand once.
-struct Once<T>(Option<(Span, T)>);
+pub struct Once<T>(Option<(Span, T)>);
 
 impl<T> Default for Once<T> {
     fn default() -> Self {
@@ -350,7 +368,7 @@ impl<T> Default for Once<T> {
 }
 
 impl<T> Once<T> {
-    fn set(&mut self, what: &str, span: Span, value: T) -> Built<()> {
+    pub fn set(&mut self, what: &str, span: Span, value: T) -> Built<()> {
         if let Some((first, _)) = &self.0 {
             let diagnostic = Diagnostic::error(codes::S011, format!("`{what}` stands here twice"))
                 .at(span, "the second")
@@ -362,7 +380,7 @@ impl<T> Once<T> {
         Ok(())
     }
 
-    fn value(&mut self) -> Option<T> {
+    pub fn value(&mut self) -> Option<T> {
         self.0.take().map(|(_, value)| value)
     }
 }

@@ -57,6 +57,17 @@ pub fn literal(rule: Rule) -> Option<&'static str> {
         R::kw_when => "when",
         R::kw_factor => "factor",
         R::kw_against => "against",
+        R::kw_head => "head",
+        R::kw_flux => "flux",
+        R::kw_no_flow => "no_flow",
+        R::kw_periodic => "periodic",
+        R::kw_conductivity => "conductivity",
+        R::kw_anisotropy => "anisotropy",
+        R::kw_well => "well",
+        R::kw_rate | R::well_rate => "rate",
+        R::kw_screen | R::screen => "screen",
+        R::kw_grid => "grid",
+        R::kw_during | R::during => "during",
         _ => return None,
     })
 }
@@ -90,6 +101,24 @@ pub fn expected_words(rule: Rule) -> Vec<String> {
         R::arrow => one("`->`"),
         R::rate_sign => one("`@`"),
         R::dots => one("`..`"),
+        R::head
+        | R::flux
+        | R::no_flow
+        | R::periodic
+        | R::conductivity
+        | R::anisotropy
+        | R::well
+        | R::cells => one("an entry such as `head left 1 m`"),
+        R::side_value => one("a side such as `left`"),
+        R::darcy => one("`{`"),
+        R::dispersion_part | R::dispersion_word => one("a part such as `longitudinal 0.5 m`"),
+        R::medium_part => one("a property such as `porosity 0.3`"),
+        R::carried => one("a name with `=`"),
+        R::patch => ["`x`", "`y`", "`z`"].map(str::to_owned).to_vec(),
+        R::side_rate | R::valued | R::valued_word => one("a further word"),
+        R::region => one("a region such as `at point(1 m, 2 m)`"),
+        R::region_argument => one(VALUE),
+        R::share => one("a name"),
         R::times_sign => one("`x`"),
         R::replicates | R::sweep_seed | R::common | R::skip | R::expect | R::zip => Vec::new(),
         R::sweep_axis => one("an axis such as `step 1 s, 2 s`"),

@@ -26,7 +26,8 @@ pub fn columns_of(words: &[&str]) -> Option<Columns> {
             let equation = outside(words, ":").map(|colon| colon + 1);
             ("reaction", vec![equation, equation.and_then(|_| outside(words, "@"))])
         }
-        "boundary" => ("boundary", vec![words.len().checked_sub(1)]),
+        "boundary" => ("boundary", vec![after_sides(words)]),
+        "source" => ("source", vec![outside(words, ":").map(|colon| colon + 1)]),
         "output" => ("output", vec![Some(2).filter(|_| is_species_list(words)), first_clause_at(words)]),
         _ => return None,
     };
@@ -54,6 +55,15 @@ pub fn entry_columns(words: &[&str], is_zipped: bool) -> Option<Columns> {
     let has_value = words.get(value).is_some_and(|word| !matches!(*word, "{" | ";"));
     let group = if is_zipped { "zipped" } else { "entry" };
     has_value.then(|| Columns { group, stops: vec![(0, value)] })
+}
+
+/// What follows the list of sides: a part of them, or what happens there.
+fn after_sides(words: &[&str]) -> Option<usize> {
+    let mut position = 2;
+    while words.get(position) == Some(&",") {
+        position += 2;
+    }
+    (position < words.len()).then_some(position)
 }
 
 fn is_species_list(words: &[&str]) -> bool {

@@ -13,6 +13,19 @@ use crate::syntax::words::RESERVED_WORDS;
 const BEFORE_VALUE: &[&str] =
     &["fraction", "rate", "moving", "to", "step", "dispersion", "uniform", "charge", "forward", "backward"];
 
+/// The same in statements of transport: keyword and word.
+const BEFORE_VALUE_IN: &[(&str, &[&str])] = &[
+    ("species", &["retardation", "diffusion"]),
+    ("medium", &["porosity"]),
+    ("dispersion", &["longitudinal", "transverse", "transverse_vertical", "molecular"]),
+    ("flow", &["left", "right", "bottom", "top", "front", "back", "conductivity", "anisotropy"]),
+];
+
+fn is_before_value(keyword: &str, word: &str) -> bool {
+    let of_keyword = BEFORE_VALUE_IN.iter().find(|(own, _)| *own == keyword);
+    BEFORE_VALUE.contains(&word) || of_keyword.is_some_and(|(_, words)| words.contains(&word))
+}
+
 /// The number of blanks before each token of a line; `keyword` is the first token of its statement.
 pub fn gaps(lexed: Lexed, line: &[usize], keyword: usize) -> Vec<usize> {
     let marks = unit_marks(lexed, line);
@@ -70,7 +83,7 @@ impl<'t> Pair<'_, 't> {
             Some(TokenKind::Symbol) => !matches!(word, ")" | "]" | "}") && !self.marks[before],
             Some(TokenKind::Word) => {
                 let is_before_value = RESERVED_WORDS.contains(&word)
-                    || BEFORE_VALUE.contains(&word)
+                    || is_before_value(self.lexed.slice(self.keyword), word)
                     || (self.lexed.slice(self.keyword) == "sweep"
                         && self.lexed.begins_entry(self.line[before]));
                 !self.marks[before] && is_before_value

@@ -1,0 +1,209 @@
+//! The transport of a plan in words.
+//!
+//! Owns these lines. May use the plan. It deliberately works nothing out.
+
+use super::Plan;
+use super::explain::grouped;
+use super::tape::{Operation, Tape};
+use super::transport::{
+    Conductivity, Covariance, Darcy, DarcySide, Dispersion, Flow, Patch, Region, SideRule, Source, Strength,
+    Transport,
+};
+use crate::diagnostic::number;
+
+/// Flow, dispersion, sides, sources, populations and sub-steps; nothing for a walk of fluid.
+pub(super) fn lines(plan: &Plan) -> Vec<String> {
+    let Some(transport) = &plan.transport else { return Vec::new() };
+    let mut lines = flow_lines(plan, &transport.flow);
+    lines.push(dispersion_line(&transport.dispersion));
+    lines.push(format!("porosity: {}", tape(&transport.porosity, "")));
+    for interface in &transport.interfaces {
+        let axis = plan.axes.get(interface.axis).map_or("", |axis| axis_name(axis.index));
+        lines.push(format!("coefficients jump at {axis} = {} m", number(interface.at)));
+    }
+    side_lines(plan, transport, &mut lines);
+    lines.extend(transport.sources.iter().map(|source| source_line(plan, source)));
+    for population in &transport.populations {
+        let mut line =
+            format!("{} particles of {}", grouped(population.count), name(plan, population.species));
+        if population.retardation != 1.0 {
+            line += &format!(", retardation {}", number(population.retardation));
+        }
+        if let Some(molecular) = population.molecular {
+            line += &format!(", molecular diffusion {} m^2/s", number(molecular));
+        }
+        if !population.is_mobile {
+            line += ", immobile";
+        }
+        lines.push(line);
+    }
+    lines.push(match transport.sub_steps {
+        None => "steps: one displacement of each particle in a step".to_owned(),
+        Some(sub_steps) => format!(
+            "steps: each particle divides a step so that its Courant number is at most {} and its dispersion number at most {}",
+            number(sub_steps.courant),
+            number(sub_steps.dispersion)
+        ),
+    });
+    lines
+}
+
+fn axis_name(index: usize) -> &'static str {
+    ["x", "y", "z"][index]
+}
+
+fn name(plan: &Plan, species: usize) -> &str {
+    plan.species.get(species).map_or("", |species| species.name.as_str())
+}
+
+fn tape(tape: &Tape, unit: &str) -> String {
+    match tape.operations.as_slice() {
+        [Operation::Constant(value)] => format!("{}{unit}", number(*value)),
+        operations => format!("an expression of {} operations", operations.len()),
+    }
+}
+
+fn list(values: &[f64]) -> String {
+    values.iter().map(|value| number(*value)).collect::<Vec<_>>().join(", ")
+}
+
+fn flow_lines(plan: &Plan, flow: &Flow) -> Vec<String> {
+    match flow {
+        Flow::Uniform(velocity) => vec![format!("flow: uniform, ({}) m/s in the frame", list(velocity))],
+        Flow::Expression(tapes) => {
+            let parts: Vec<String> = tapes.iter().map(|part| tape(part, " m/s")).collect();
+            vec![format!("flow: velocity ({})", parts.join(", "))]
+        }
+        Flow::Darcy(darcy) => darcy_lines(plan, darcy),
+        Flow::File(file) => {
+            let names: Vec<&str> = file.files.iter().map(|(name, _)| name.as_str()).collect();
+            vec![format!("flow: read from {}", names.join(", "))]
+        }
+    }
+}
+
+fn darcy_lines(plan: &Plan, darcy: &Darcy) -> Vec<String> {
+    let cells: Vec<String> = darcy.cells.iter().map(ToString::to_string).collect();
+    let mut lines = vec![format!("flow: Darcy on {} cells", cells.join(" x "))];
+    for (axis, ends) in plan.axes.iter().zip(&darcy.sides) {
+        let side = |side: &DarcySide| match side {
+            DarcySide::Head(head) => format!("head {} m", number(*head)),
+            DarcySide::Flux(flux) => format!("flux {} m/s inwards", number(*flux)),
+            DarcySide::NoFlow => "no flow".to_owned(),
+            DarcySide::Periodic => "periodic".to_owned(),
+        };
+        lines.push(format!("  along {}: {} / {}", axis_name(axis.index), side(&ends[0]), side(&ends[1])));
+    }
+    lines.push(match &darcy.conductivity {
+        Conductivity::Expression(of) => format!("  conductivity {}", tape(of, " m/s")),
+        Conductivity::Lognormal { geometric_mean, variance, covariance, lengths, seed } => format!(
+            "  conductivity lognormal: geometric mean {} m/s, variance {} of ln K, {} covariance over ({}) m, seed {seed}",
+            number(*geometric_mean),
+            number(*variance),
+            match covariance {
+                Covariance::Exponential => "exponential",
+                Covariance::Gaussian => "Gaussian",
+            },
+            list(lengths)
+        ),
+    });
+    if darcy.anisotropy.iter().any(|factor| *factor != 1.0) {
+        lines.push(format!("  anisotropy ({})", list(&darcy.anisotropy)));
+    }
+    for well in &darcy.wells {
+        let place = if well.low == well.high {
+            format!("at ({}) m", list(&well.low))
+        } else {
+            format!("from ({}) to ({}) m", list(&well.low), list(&well.high))
+        };
+        lines.push(format!("  well {} {place}, rate {} (SI)", well.name, number(well.rate)));
+    }
+    lines
+}
+
+fn dispersion_line(dispersion: &Dispersion) -> String {
+    match dispersion {
+        Dispersion::Constant(triangle) => format!("dispersion: lower triangle ({}) m^2/s", list(triangle)),
+        Dispersion::Isotropic(of) => format!("dispersion: {}", tape(of, " m^2/s")),
+        Dispersion::Velocity { longitudinal, transverse, transverse_vertical, molecular } => format!(
+            "dispersion: longitudinal {} m, transverse {} m, vertical {} m, molecular {} m^2/s",
+            number(*longitudinal),
+            number(*transverse),
+            number(*transverse_vertical),
+            number(*molecular)
+        ),
+    }
+}
+
+fn side_lines(plan: &Plan, transport: &Transport, lines: &mut Vec<String>) {
+    for (axis_idx, ends) in transport.sides.iter().enumerate() {
+        let Some(axis) = plan.axes.get(axis_idx) else { continue };
+        for (patches, at) in ends.iter().zip([axis.low, axis.high]) {
+            for patch in patches {
+                let part = part(plan, patch, axis_idx);
+                let rule = rule(plan, &patch.rule);
+                lines.push(format!("side {} = {} m{part}: {rule}", axis_name(axis.index), number(at)));
+            }
+        }
+    }
+}
+
+/// The limits of a part of a side.
+fn part(plan: &Plan, patch: &Patch, normal: usize) -> String {
+    let mut text = String::new();
+    for (idx, axis) in plan.axes.iter().enumerate().filter(|(idx, _)| *idx != normal) {
+        if (patch.low[idx], patch.high[idx]) != (axis.low, axis.high) {
+            text += &format!(
+                ", {} = {} .. {} m",
+                axis_name(axis.index),
+                number(patch.low[idx]),
+                number(patch.high[idx])
+            );
+        }
+    }
+    text
+}
+
+fn rule(plan: &Plan, rule: &SideRule) -> String {
+    let carried = |tapes: &[Tape]| {
+        let parts: Vec<String> = tapes
+            .iter()
+            .enumerate()
+            .map(|(idx, of)| format!("{} = {}", name(plan, idx), tape(of, "")))
+            .collect();
+        parts.join(", ")
+    };
+    match rule {
+        SideRule::Reflect => "reflect".to_owned(),
+        SideRule::Periodic => "periodic".to_owned(),
+        SideRule::Open => "open".to_owned(),
+        SideRule::Absorb => "absorb".to_owned(),
+        SideRule::Partial(rate) => format!("absorb at {} m/s", number(*rate)),
+        SideRule::Outflow => "outflow".to_owned(),
+        SideRule::Inflow(tapes) => format!("inflow with {} (SI)", carried(tapes)),
+        SideRule::Held(tapes) => format!("held at {} (SI)", carried(tapes)),
+    }
+}
+
+fn source_line(plan: &Plan, source: &Source) -> String {
+    let region = match &source.region {
+        Region::Point(at) => format!("at the point ({}) m", list(at)),
+        Region::Line(from, to) => format!("along the line from ({}) to ({}) m", list(from), list(to)),
+        Region::Box(low, high) => format!("in the box from ({}) to ({}) m", list(low), list(high)),
+        Region::Gaussian(centre, deviation) => {
+            format!("in a Gaussian about ({}) m with ({}) m", list(centre), list(deviation))
+        }
+        Region::Table(columns) => format!("at {} places", columns.first().map_or(0, Vec::len)),
+    };
+    let unit =
+        if plan.species.get(source.species).is_some_and(|species| species.is_molar) { "mol" } else { "kg" };
+    let per = ["/m^2", "/m", ""][plan.axes.len().clamp(1, 3) - 1];
+    let (from, to) = source.during;
+    let window = format!("from {} to {} s", number(from), number(to));
+    let what = match source.strength {
+        Strength::Pulse(amount) => format!("{} {unit}{per} at once", number(amount)),
+        Strength::Rate(rate) => format!("{} {unit}{per}/s {window}", number(rate)),
+        Strength::Held(c) => format!("held at {} {unit}/m^3 {window}", number(c)),
+    };
+    format!("source {}: {} of {} {region}", source.name, what, name(plan, source.species))
+}

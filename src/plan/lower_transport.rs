@@ -1,0 +1,338 @@
+//! Transport of masses, from the scenario to what the engine walks in.
+//!
+//! Owns the lowering of flow, dispersion, sides, sources and populations. May use the scenario and the tape.
+//! It deliberately solves no flow; what can be seen without one is checked in `transport_limits`.
+
+use super::Axis;
+use super::build_tape::build_tape;
+use super::lower::too_large;
+use super::shares;
+use super::tape::{Binary, Operation, Tape};
+use super::transport::{
+    Conductivity, Darcy, DarcySide, Dispersion, Flow, Interface, Patch, Population, Region, SideRule, Source,
+    Strength, Transport, Well,
+};
+use crate::diagnostic::Diagnostic;
+use crate::scenario::expression::Expr;
+use crate::scenario::transport as written;
+use crate::scenario::{self, Scenario};
+use crate::source::Span;
+
+/// The transport of a scene with masses; `None` where today's walk of fluid says everything.
+pub(super) fn transport(scenario: &Scenario, axes: &[Axis]) -> Result<Option<Transport>, Vec<Diagnostic>> {
+    if scenario.particles.shares.is_none() {
+        return Ok(None);
+    }
+    let mut lowering = Lowering { scenario, axes, problems: Vec::new() };
+    let transport = lowering.transport();
+    match transport {
+        Some(transport) if lowering.problems.is_empty() => Ok(Some(transport)),
+        _ => Err(lowering.problems),
+    }
+}
+
+/// `value` everywhere.
+pub(super) fn constant(value: f64) -> Tape {
+    Tape { operations: vec![Operation::Constant(value)] }
+}
+
+/// Tensor of constant dispersion in a uniform flow, m²/s.
+///
+/// - Equation: `D = |v| (α_L n nᵀ + Σ_k α_k t_k t_kᵀ) + D_m I` in the form of Burnett and Frind, with a
+///   transverse length of its own for what is vertical.
+/// - Symbols: `n = v/|v|`; α lengths along, across and vertically across the flow; `D_m` molecular.
+/// - Range: any velocity; without flow the molecular part is left.
+/// - Source: R. D. Burnett, E. O. Frind (1987), Water Resources Research 23(4), 695.
+/// - Shape: 3 × 3, x, y, z.
+pub(super) fn uniform_tensor(velocity: [f64; 3], [along, across, vertical, own]: [f64; 4]) -> [[f64; 3]; 3] {
+    let speed = velocity.iter().map(|v| v * v).sum::<f64>().sqrt();
+    let n = if speed > 0.0 { velocity.map(|v| v / speed) } else { [0.0; 3] };
+    let square = n.map(|n| n * n);
+    let mut tensor = [[0.0; 3]; 3];
+    for i in 0..3 {
+        for j in 0..3 {
+            let is_vertical = i == 2 || j == 2;
+            let other = if is_vertical { vertical } else { across };
+            let part = if i == j {
+                let mut sum = along * square[i];
+                for k in (0..3).filter(|&k| k != i) {
+                    sum += if i == 2 || k == 2 { vertical } else { across } * square[k];
+                }
+                sum
+            } else {
+                (along - other) * n[i] * n[j]
+            };
+            tensor[i][j] = speed * part + if i == j { own } else { 0.0 };
+        }
+    }
+    tensor
+}
+
+struct Lowering<'a> {
+    scenario: &'a Scenario,
+    axes: &'a [Axis],
+    problems: Vec<Diagnostic>,
+}
+
+impl Lowering<'_> {
+    fn transport(&mut self) -> Option<Transport> {
+        let flow = self.flow()?;
+        let (dispersion, own) = self.dispersion()?;
+        let porosity = match &self.scenario.medium {
+            Some(porosity) => self.tape(&porosity.value, porosity.span)?,
+            None => constant(1.0),
+        };
+        let sides = self.sides()?;
+        let sources = self.scenario.sources.iter().map(|source| self.source(source)).collect();
+        let populations = self.populations(own)?;
+        let interfaces = self.interfaces(&dispersion, &porosity);
+        let mut transport = Transport {
+            flow,
+            dispersion,
+            porosity,
+            sides,
+            sources,
+            populations,
+            decay: None,
+            sub_steps: None,
+            interfaces,
+        };
+        let counts = shares::counts(self.scenario, self.axes, &transport);
+        transport.populations.iter_mut().zip(counts).for_each(|(population, count)| population.count = count);
+        Some(transport)
+    }
+
+    fn tape(&mut self, expr: &Expr, span: Span) -> Option<Tape> {
+        let tape = build_tape(expr, &self.scenario.species);
+        if tape.is_none() {
+            self.problems.push(too_large(span));
+        }
+        tape
+    }
+
+    /// The entries of the active axes.
+    fn along_axes(&self, all: [f64; 3]) -> Vec<f64> {
+        self.axes.iter().map(|axis| all[axis.index]).collect()
+    }
+
+    fn flow(&mut self) -> Option<Flow> {
+        let scenario = self.scenario;
+        let frame = scenario.domain.frame;
+        Some(match scenario.flow.as_ref().map(|flow| (&flow.value, flow.span)) {
+            None => Flow::Uniform(self.along_axes(frame.map(|v| 0.0 - v))),
+            Some((written::Flow::Uniform(velocity), _)) => {
+                let relative = [0, 1, 2].map(|index| velocity[index] - frame[index]);
+                Flow::Uniform(self.along_axes(relative))
+            }
+            Some((written::Flow::Expression(list), _)) => {
+                let tapes: Vec<Option<Tape>> = list.iter().map(|expr| self.tape(expr, expr.span)).collect();
+                Flow::Expression(tapes.into_iter().collect::<Option<_>>()?)
+            }
+            Some((written::Flow::Darcy(darcy), _)) => Flow::Darcy(Box::new(self.darcy(darcy)?)),
+        })
+    }
+
+    fn darcy(&mut self, darcy: &written::Darcy) -> Option<Darcy> {
+        let side = |side: written::DarcySide| match side {
+            written::DarcySide::Head(head) => DarcySide::Head(head),
+            written::DarcySide::Flux(flux) => DarcySide::Flux(flux),
+            written::DarcySide::NoFlow => DarcySide::NoFlow,
+            written::DarcySide::Periodic => DarcySide::Periodic,
+        };
+        let conductivity = match &darcy.conductivity {
+            written::Conductivity::Expression(expr) => {
+                Conductivity::Expression(self.tape(expr, darcy.conductivity_span)?)
+            }
+            written::Conductivity::Lognormal { geometric_mean, variance, covariance, lengths, seed } => {
+                Conductivity::Lognormal {
+                    geometric_mean: *geometric_mean,
+                    variance: *variance,
+                    covariance: *covariance,
+                    lengths: lengths.clone(),
+                    seed: seed.unwrap_or(self.scenario.seed),
+                }
+            }
+        };
+        let well = |well: &written::Well| Well {
+            name: well.name.clone(),
+            low: self.along_axes(well.low),
+            high: self.along_axes(well.high),
+            rate: well.rate,
+        };
+        Some(Darcy {
+            cells: darcy.cells.clone(),
+            sides: darcy.sides.iter().map(|&[low, high]| [side(low), side(high)]).collect(),
+            conductivity,
+            anisotropy: darcy.anisotropy.clone(),
+            wells: darcy.wells.iter().map(well).collect(),
+        })
+    }
+
+    /// Dispersion, and the molecular part that a species has instead of its own if it is not in there.
+    fn dispersion(&mut self) -> Option<(Dispersion, Option<f64>)> {
+        let scenario = self.scenario;
+        let triangle = |tensor: [[f64; 3]; 3]| {
+            let rows = self.axes.iter().enumerate();
+            rows.flat_map(|(i, row)| {
+                self.axes[..=i].iter().map(move |column| tensor[row.index][column.index])
+            })
+            .collect()
+        };
+        let Some(dispersion) = &scenario.dispersion else {
+            return Some((Dispersion::Constant(triangle([[0.0; 3]; 3])), None));
+        };
+        Some(match &dispersion.value {
+            written::Dispersion::Tensor(tensor) => (Dispersion::Constant(triangle(*tensor)), None),
+            written::Dispersion::Isotropic(expr) => {
+                (Dispersion::Isotropic(self.tape(expr, dispersion.span)?), None)
+            }
+            written::Dispersion::Parts { longitudinal, transverse, transverse_vertical, molecular } => {
+                let is_moving = scenario.domain.frame.iter().any(|v| *v != 0.0);
+                let uniform = match scenario.flow.as_ref().map(|flow| &flow.value) {
+                    Some(written::Flow::Uniform(velocity)) => Some(*velocity),
+                    _ => None,
+                };
+                if let (true, Some(velocity)) = (is_moving, uniform) {
+                    // Lengths multiply the velocity of the water, not that in the frame.
+                    let lengths = [*longitudinal, *transverse, *transverse_vertical, 0.0];
+                    let tensor = uniform_tensor(velocity, lengths);
+                    return Some((Dispersion::Constant(triangle(tensor)), Some(*molecular)));
+                }
+                // In a vertical section what is across is vertical.
+                let is_section = self.axes.len() == 2 && self.axes.iter().any(|axis| axis.index == 2);
+                let parts = Dispersion::Velocity {
+                    longitudinal: *longitudinal,
+                    transverse: if is_section { *transverse_vertical } else { *transverse },
+                    transverse_vertical: *transverse_vertical,
+                    molecular: *molecular,
+                };
+                (parts, None)
+            }
+        })
+    }
+
+    fn sides(&mut self) -> Option<Vec<[Vec<Patch>; 2]>> {
+        let mut sides = Vec::new();
+        for axis in &self.scenario.domain.axes {
+            let [low, high] = &axis.patches;
+            sides.push([self.patches(low)?, self.patches(high)?]);
+        }
+        Some(sides)
+    }
+
+    fn patches(&mut self, list: &[written::Patch]) -> Option<Vec<Patch>> {
+        let mut patches = Vec::new();
+        for patch in list {
+            let rule = match &patch.rule {
+                written::SideRule::Reflect => SideRule::Reflect,
+                written::SideRule::Periodic => SideRule::Periodic,
+                written::SideRule::Open => SideRule::Open,
+                written::SideRule::Absorb => SideRule::Absorb,
+                written::SideRule::Partial(rate) => SideRule::Partial(*rate),
+                written::SideRule::Outflow => SideRule::Outflow,
+                written::SideRule::Inflow(list) => SideRule::Inflow(self.concentrations(list)?),
+                written::SideRule::Held(list) => SideRule::Held(self.concentrations(list)?),
+            };
+            let limit = |index: usize| patch.limits.iter().find(|(other, ..)| *other == index);
+            let low = self.axes.iter().map(|axis| limit(axis.index).map_or(axis.low, |it| it.1)).collect();
+            let high = self.axes.iter().map(|axis| limit(axis.index).map_or(axis.high, |it| it.2)).collect();
+            patches.push(Patch { low, high, rule });
+        }
+        Some(patches)
+    }
+
+    /// One tape for each species of the scene; what is not named is not there.
+    fn concentrations(&mut self, list: &[(usize, Expr)]) -> Option<Vec<Tape>> {
+        let mut tapes = vec![constant(0.0); self.scenario.species.len()];
+        for (species, expr) in list {
+            tapes[*species] = self.tape(expr, expr.span)?;
+        }
+        Some(tapes)
+    }
+
+    fn source(&self, source: &written::Source) -> Source {
+        let along = |all| self.along_axes(all);
+        let region = match source.region {
+            written::Region::Point(at) => Region::Point(along(at)),
+            written::Region::Line(from, to) => Region::Line(along(from), along(to)),
+            written::Region::Box(low, high) => Region::Box(along(low), along(high)),
+            written::Region::Gaussian(centre, deviation) => Region::Gaussian(along(centre), along(deviation)),
+        };
+        let strength = match source.strength {
+            written::Strength::Pulse(amount) => Strength::Pulse(amount),
+            written::Strength::Rate(rate) => Strength::Rate(rate),
+            written::Strength::Held(c) => Strength::Held(c),
+        };
+        let during = source.during.unwrap_or((0.0, 0.0));
+        Source { name: source.name.clone(), species: source.species, region, strength, during }
+    }
+
+    fn populations(&mut self, own: Option<f64>) -> Option<Vec<Population>> {
+        let mut list = Vec::new();
+        for (idx, species) in self.scenario.species.iter().enumerate() {
+            list.push(Population {
+                species: idx,
+                count: 0,
+                retardation: species.retardation,
+                molecular: species.diffusion.or(own),
+                is_mobile: !species.is_immobile,
+                initial: self.tape(&species.initial, species.span)?,
+            });
+        }
+        Some(list)
+    }
+
+    /// Planes at which a comparison of a coordinate with a number switches dispersion or porosity.
+    fn interfaces(&self, dispersion: &Dispersion, porosity: &Tape) -> Vec<Interface> {
+        let of_dispersion = if let Dispersion::Isotropic(tape) = dispersion { Some(tape) } else { None };
+        let mut list: Vec<Interface> = Vec::new();
+        for tape in of_dispersion.into_iter().chain([porosity]) {
+            for (input, at) in tape.operations.iter().filter_map(|operation| threshold(tape, operation)) {
+                let Some(axis) = self.axes.iter().position(|axis| axis.index == usize::from(input)) else {
+                    continue;
+                };
+                let is_inside = self.axes[axis].low < at && at < self.axes[axis].high;
+                let interface = Interface { axis, at };
+                if is_inside && !list.contains(&interface) {
+                    list.push(interface);
+                }
+            }
+        }
+        list.sort_by(|a, b| a.axis.cmp(&b.axis).then(a.at.total_cmp(&b.at)));
+        list
+    }
+}
+
+/// The input and the number that an operation compares.
+fn threshold(tape: &Tape, operation: &Operation) -> Option<(u16, f64)> {
+    let Operation::Binary(operator, a, b) = *operation else { return None };
+    if !matches!(operator, Binary::Less | Binary::LessEqual | Binary::Greater | Binary::GreaterEqual) {
+        return None;
+    }
+    match (tape.operations[usize::from(a)], tape.operations[usize::from(b)]) {
+        (Operation::Input(input), Operation::Constant(at))
+        | (Operation::Constant(at), Operation::Input(input)) => Some((input, at)),
+        _ => None,
+    }
+}
+
+/// Drift in the frame and the tensor of a walk of fluid.
+pub(super) fn of_fluid(scenario: &Scenario) -> ([f64; 3], [[f64; 3]; 3]) {
+    let velocity = match scenario.flow.as_ref().map(|flow| &flow.value) {
+        Some(written::Flow::Uniform(velocity)) => *velocity,
+        _ => [0.0; 3],
+    };
+    let tensor = match scenario.dispersion.as_ref().map(|dispersion| &dispersion.value) {
+        Some(written::Dispersion::Tensor(tensor)) => *tensor,
+        Some(&written::Dispersion::Parts { longitudinal, transverse, transverse_vertical, molecular }) => {
+            uniform_tensor(velocity, [longitudinal, transverse, transverse_vertical, molecular])
+        }
+        Some(written::Dispersion::Isotropic(_)) | None => [[0.0; 3]; 3],
+    };
+    (velocity, tensor)
+}
+
+/// Porosity that is the same everywhere; 1 without a medium.
+pub(super) fn porosity_of_fluid(scenario: &scenario::Scenario) -> f64 {
+    scenario.medium.as_ref().and_then(|porosity| porosity.value.value()).unwrap_or(1.0)
+}

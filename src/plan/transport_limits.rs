@@ -1,0 +1,139 @@
+//! What can be seen of flow, porosity and conductivity before anything is solved.
+//!
+//! Owns the looks at sample points and their messages. May use `scenario` for the places. It deliberately
+//! refuses only what is wrong at a place that it can name.
+
+use super::Axis;
+use super::limits::short;
+use super::shares::places;
+use super::tape::Tape;
+use super::tape::dual::differentiate;
+use super::transport::{Conductivity, Flow, Transport};
+use crate::diagnostic::Diagnostic;
+use crate::diagnostic::codes::{M005, M029};
+use crate::scenario::Scenario;
+use crate::scenario::transport as written;
+use crate::source::Span;
+
+/// Largest divergence times extent over the largest discharge.
+const LARGEST_DIVERGENCE: f64 = 1e-6;
+
+/// Everything that is wrong with the fields of a scene with masses.
+pub(super) fn check(scenario: &Scenario, axes: &[Axis], transport: &Transport) -> Vec<Diagnostic> {
+    let mut problems = Vec::new();
+    if let Some(medium) = &scenario.medium {
+        let is_right = |value: f64| value > 0.0 && value <= 1.0;
+        let rule = "above 0, at most 1";
+        problems.extend(outside(
+            axes,
+            &transport.porosity,
+            "the porosity",
+            "",
+            medium.value.span,
+            is_right,
+            rule,
+        ));
+    }
+    let flow = scenario.flow.as_ref().map(|flow| (&flow.value, flow.span));
+    match (&transport.flow, flow) {
+        (Flow::Expression(tapes), Some((_, span))) => {
+            problems.extend(divergence(axes, tapes, &transport.porosity, span));
+        }
+        (Flow::Darcy(darcy), Some((written::Flow::Darcy(own), _))) => {
+            if let Conductivity::Expression(tape) = &darcy.conductivity {
+                let is_right = |value: f64| value > 0.0 && value.is_finite();
+                let span = own.conductivity_span;
+                problems.extend(outside(
+                    axes,
+                    tape,
+                    "the conductivity",
+                    " m/s",
+                    span,
+                    is_right,
+                    "above zero",
+                ));
+            }
+        }
+        _ => {}
+    }
+    problems
+}
+
+fn outside(
+    axes: &[Axis],
+    tape: &Tape,
+    what: &str,
+    unit: &str,
+    span: Span,
+    is_right: impl Fn(f64) -> bool,
+    rule: &str,
+) -> Option<Diagnostic> {
+    let all = places(axes, tape.operations.len());
+    let (place, value) =
+        all.iter().map(|place| (place, tape.evaluate(place))).find(|(_, value)| !is_right(*value))?;
+    let message = Diagnostic::error(M005, format!("{what} is out of range"))
+        .at(span, format!("{}{unit} at {}", short(value), shown(axes, place)))
+        .found(format!("{}{unit} at {}", short(value), shown(axes, place)))
+        .expected(rule);
+    Some(message)
+}
+
+fn shown(axes: &[Axis], place: &[f64; 4]) -> String {
+    let of = |axis: &Axis| format!("{} = {} m", ["x", "y", "z"][axis.index], short(place[axis.index]));
+    axes.iter().map(of).collect::<Vec<_>>().join(", ")
+}
+
+/// Water that appears or vanishes in a flow given by expressions.
+///
+/// - Equation: `∇·(φv) = Σ_i ∂(φ v_i)/∂x_i`, by derivatives of the expressions, against `max |φv| / L`.
+/// - Symbols: φ porosity, `v` velocity, `L` longest extent.
+/// - Range: sample points in the middles of equal parts of the domain; jumps between them are not seen.
+/// - Source: conservation of water of constant density.
+/// - Shape: the worst place, if it is beyond `LARGEST_DIVERGENCE`.
+fn divergence(axes: &[Axis], tapes: &[Tape], porosity: &Tape, span: Span) -> Option<Diagnostic> {
+    let n_operations = tapes.iter().chain([porosity]).map(|tape| tape.operations.len()).max()?;
+    let longest = axes.iter().map(|axis| axis.high - axis.low).fold(0.0, f64::max);
+    let mut largest: f64 = 0.0;
+    let mut worst: Option<([f64; 4], f64)> = None;
+    let slope_along = |slopes: &[(usize, f64)], index: usize| {
+        slopes.iter().find(|(input, _)| *input == index).map_or(0.0, |(_, slope)| *slope)
+    };
+    for place in places(axes, n_operations) {
+        let (values, slopes) = differentiate(&porosity.operations, &place, 0, 3);
+        let (phi, of_phi) = (values.last()?, slopes.last()?);
+        let mut sum = 0.0;
+        let mut square = 0.0;
+        for (axis, tape) in axes.iter().zip(tapes) {
+            let (values, slopes) = differentiate(&tape.operations, &place, 0, 3);
+            let (v, of_v) = (values.last()?, slopes.last()?);
+            sum += phi * slope_along(of_v, axis.index) + v * slope_along(of_phi, axis.index);
+            square += (phi * v) * (phi * v);
+        }
+        if !square.is_finite() {
+            let message = Diagnostic::error(M005, "the velocity is out of range")
+                .at(span, format!("no finite number at {}", shown(axes, &place)))
+                .found(format!("no finite number at {}", shown(axes, &place)))
+                .expected("a finite velocity everywhere in the domain");
+            return Some(message);
+        }
+        largest = largest.max(square.sqrt());
+        if worst.is_none_or(|(_, before)| sum.abs() > before.abs()) {
+            worst = Some((place, sum));
+        }
+    }
+    let (place, value) = worst?;
+    if value.abs() * longest <= LARGEST_DIVERGENCE * largest {
+        return None;
+    }
+    let at = shown(axes, &place);
+    let what = if value > 0.0 { "water appears" } else { "water vanishes" };
+    let message = Diagnostic::error(M029, "this flow does not keep its water")
+        .at(span, format!("{what} at {at}"))
+        .found(format!("a divergence of {} /s at {at}", short(value)))
+        .expected(format!(
+            "a divergence of porosity times velocity below {} /s, 1e-6 of the largest discharge over the extent",
+            short(LARGEST_DIVERGENCE * largest / longest)
+        ))
+        .help("velocities from a stream function, u = dψ/dy and v = -dψ/dx over the porosity, have none");
+    Some(message)
+}

@@ -1,0 +1,163 @@
+//! Transport as a scene says it: porosity, flow, dispersion, sides, sources, masses.
+//!
+//! Owns the types, and in the files beside it the checks. May use the scenario's slots and expressions. It
+//! deliberately solves and samples nothing: `plan` and `flow` do.
+
+pub(super) mod darcy;
+pub(super) mod dispersion;
+pub(super) mod flow;
+pub(super) mod lognormal;
+pub(super) mod masses;
+pub(super) mod restriction;
+pub(super) mod sides;
+pub(super) mod source;
+
+use super::choice::Covariance;
+use super::expression::Expr;
+use crate::source::Span;
+
+/// How the water moves, in the resting frame.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Flow {
+    /// m/s along x, y, z
+    Uniform([f64; 3]),
+    /// m/s, an expression of the place for each axis of the domain.
+    Expression(Vec<Expr>),
+    Darcy(Box<Darcy>),
+}
+
+/// What is solved for the flow.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Darcy {
+    /// Along each axis of the domain.
+    pub cells: Vec<usize>,
+    pub cells_span: Span,
+    /// Per axis of the domain: the lower side, the upper side.
+    pub sides: Vec<[DarcySide; 2]>,
+    pub conductivity: Conductivity,
+    pub conductivity_span: Span,
+    /// Along each axis of the domain over that along the first.
+    pub anisotropy: Vec<f64>,
+    pub wells: Vec<Well>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum DarcySide {
+    /// m
+    Head(f64),
+    /// Specific discharge into the domain, m/s.
+    Flux(f64),
+    NoFlow,
+    Periodic,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum Conductivity {
+    /// m/s, over the place.
+    Expression(Expr),
+    Lognormal {
+        geometric_mean: f64,
+        /// Of ln K.
+        variance: f64,
+        covariance: Covariance,
+        /// Along each axis of the domain, m.
+        lengths: Vec<f64>,
+        /// That of the scene if absent.
+        seed: Option<u64>,
+    },
+}
+
+/// A well: a point, or a line along the last axis of the domain.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Well {
+    pub name: String,
+    pub low: [f64; 3],
+    pub high: [f64; 3],
+    /// Water put in, m³/s, per m² or m with fewer axes.
+    pub rate: f64,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum Dispersion {
+    /// m²/s
+    Tensor([[f64; 3]; 3]),
+    /// m²/s, the same in all directions, over the place.
+    Isotropic(Expr),
+    /// Lengths in m, molecular in m²/s.
+    Parts { longitudinal: f64, transverse: f64, transverse_vertical: f64, molecular: f64 },
+}
+
+/// A part of a side, or all of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Patch {
+    /// Of the side's name in its statement.
+    pub span: Span,
+    /// `(axis x, y, z, low, high)`; none for what is left of the side.
+    pub limits: Vec<(usize, f64, f64)>,
+    pub rule: SideRule,
+    /// Which `boundary` statement it is of.
+    pub(super) statement: usize,
+}
+
+/// What happens at a side.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SideRule {
+    Reflect,
+    Periodic,
+    Open,
+    Absorb,
+    /// m/s
+    Partial(f64),
+    Outflow,
+    /// Concentrations of species in the water that enters; 0 for all others.
+    Inflow(Vec<(usize, Expr)>),
+    /// Concentrations of species that are held; 0 for all others.
+    Held(Vec<(usize, Expr)>),
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Source {
+    pub name: String,
+    pub span: Span,
+    pub species: usize,
+    pub region: Region,
+    pub strength: Strength,
+    /// s; nothing for what is put in at once.
+    pub during: Option<(f64, f64)>,
+}
+
+/// Places along x, y, z.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Region {
+    Point([f64; 3]),
+    Line([f64; 3], [f64; 3]),
+    Box([f64; 3], [f64; 3]),
+    /// Centre and standard deviation.
+    Gaussian([f64; 3], [f64; 3]),
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Strength {
+    /// mol or kg, per m² or m with fewer axes.
+    Pulse(f64),
+    /// The same per s.
+    Rate(f64),
+    /// mol/m³ or kg/m³
+    Held(f64),
+}
+
+/// How particles that carry mass are shared among species.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Shares {
+    /// By their masses.
+    ByMass,
+    /// For each species of the scene.
+    Given(Vec<u64>),
+}
+
+/// Criteria of `step auto`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Auto {
+    pub courant: f64,
+    pub dispersion: f64,
+}

@@ -1,0 +1,124 @@
+//! Sides, flow, dispersion and sources: their parts in the order of the grammar.
+//!
+//! Owns the shapes of these statements. May use the statements and expressions beside it. It deliberately
+//! resolves no name.
+
+use super::statements::{Once, assignment, axis, counts, each, field};
+use super::{Parts, span_at, spanned};
+use crate::syntax::climb::Built;
+use crate::syntax::grammar::Rule;
+use crate::syntax::tree::{
+    Assignment, Boundary, DarcyEntry, DarcyKind, Dispersion, Expr, Field, Flow, FlowArgument, Name,
+    RegionArgument, Source, Well,
+};
+use pest::iterators::Pair;
+
+pub fn boundary(parts: &mut Parts) -> Built<Boundary> {
+    let sides = parts.names(Rule::side);
+    let patch = match parts.take(Rule::patch) {
+        Some(pair) => each(&mut Parts::of(parts.place, pair), Rule::axis, axis)?,
+        None => Vec::new(),
+    };
+    let kind = parts.wrapped_name(Rule::boundary_kind)?;
+    let carried = carried(parts)?;
+    let rate =
+        parts.take(Rule::side_rate).map(|pair| field(&mut Parts::of(parts.place, pair))).transpose()?;
+    Ok(Boundary { sides, patch, kind, carried, rate })
+}
+
+fn carried(parts: &mut Parts) -> Built<Vec<Assignment>> {
+    match parts.take(Rule::carried) {
+        Some(pair) => each(&mut Parts::of(parts.place, pair), Rule::assignment, assignment),
+        None => Ok(Vec::new()),
+    }
+}
+
+pub fn flow(parts: &mut Parts) -> Built<Flow> {
+    // The `=` is no part; it stands right after the kind.
+    let text = parts.pairs.clone().find(|pair| matches!(pair.as_rule(), Rule::assign | Rule::darcy));
+    let is_assigned = text.is_some_and(|pair| pair.as_rule() == Rule::assign);
+    let kind = parts.wrapped_name(Rule::kind)?;
+    let argument = match parts.take(Rule::darcy) {
+        Some(pair) => FlowArgument::Entries(entries(&mut Parts::of(parts.place, pair))?),
+        None => match parts.optional_expression()? {
+            Some(value) if is_assigned => FlowArgument::Assigned(value),
+            Some(value) => FlowArgument::Value(value),
+            None => FlowArgument::None,
+        },
+    };
+    Ok(Flow { kind, argument })
+}
+
+fn entries(parts: &mut Parts) -> Built<Vec<DarcyEntry>> {
+    let mut list = Vec::new();
+    while let Some(pair) = parts.next() {
+        let word = pair
+            .clone()
+            .into_inner()
+            .next()
+            .map_or_else(|| span_at(parts.place, &pair), |keyword| span_at(parts.place, &keyword));
+        let kind = entry(parts, pair)?;
+        list.push(DarcyEntry { word, kind });
+    }
+    Ok(list)
+}
+
+fn entry(parts: &Parts, pair: Pair<Rule>) -> Built<DarcyKind> {
+    let rule = pair.as_rule();
+    let mut inner = Parts::of(parts.place, pair);
+    Ok(match rule {
+        Rule::head => DarcyKind::Head(each(&mut inner, Rule::side_value, side_value)?),
+        Rule::flux => DarcyKind::Flux(each(&mut inner, Rule::side_value, side_value)?),
+        Rule::no_flow => DarcyKind::NoFlow(inner.names(Rule::side)),
+        Rule::periodic => DarcyKind::Periodic(inner.names(Rule::side)),
+        Rule::conductivity => DarcyKind::Conductivity(inner.expression()?),
+        Rule::anisotropy => DarcyKind::Anisotropy(inner.expression()?),
+        Rule::well => DarcyKind::Well(Box::new(well(&mut inner)?)),
+        _ => DarcyKind::Grid(counts(&mut inner)?),
+    })
+}
+
+fn side_value(parts: &mut Parts) -> Built<(Name, Expr)> {
+    let side = parts.need(Rule::side)?;
+    Ok((spanned(parts.place, &side), parts.expression()?))
+}
+
+fn well(parts: &mut Parts) -> Built<Well> {
+    let (name, at) = (parts.name()?, parts.expression()?);
+    let (mut rate, mut screen) = (Once::default(), Once::default());
+    while let Some(pair) = parts.next() {
+        let (rule, span) = (pair.as_rule(), span_at(parts.place, &pair));
+        let mut inner = Parts::of(parts.place, pair);
+        match rule {
+            Rule::well_rate => rate.set("rate", span, inner.expression()?)?,
+            _ => screen.set("screen", span, inner.range()?)?,
+        }
+    }
+    Ok(Well { name, at, rate: rate.value(), screen: screen.value() })
+}
+
+pub fn dispersion(parts: &mut Parts) -> Built<Dispersion> {
+    let list = each(parts, Rule::dispersion_part, |parts| {
+        let word = parts.need(Rule::dispersion_word)?;
+        Ok(Field { name: spanned(parts.place, &word), value: parts.expression()? })
+    })?;
+    if list.is_empty() { Ok(Dispersion::Value(parts.expression()?)) } else { Ok(Dispersion::Parts(list)) }
+}
+
+pub fn source(parts: &mut Parts) -> Built<Source> {
+    let name = parts.wrapped_name(Rule::label)?;
+    let carried = carried(parts)?;
+    let pair = parts.need(Rule::region)?;
+    let mut region = Parts::of(parts.place, pair);
+    let kind = region.name()?;
+    let arguments = each(&mut region, Rule::region_argument, |parts| {
+        let is_range = parts.pairs.peek().is_some_and(|pair| pair.as_rule() == Rule::range);
+        if is_range {
+            Ok(RegionArgument::Range(parts.range()?))
+        } else {
+            Ok(RegionArgument::Value(parts.expression()?))
+        }
+    })?;
+    let during = parts.take(Rule::during).map(|pair| Parts::of(parts.place, pair).range()).transpose()?;
+    Ok(Source { name, carried, region: kind, arguments, during })
+}
