@@ -3,14 +3,17 @@
 //! Bounds: four times the sampling noise that the run itself reports for its bins, or 1 % where the number of
 //! particles makes the noise smaller than that. The closed forms stand in the scenes.
 
-use lamella::engine::snapshot::{Outcome, Snapshot};
+use lamella::engine::snapshot::{Outcome, Snapshot, Values};
 use lamella::engine::{Settings as EngineSettings, Unattended};
 use lamella::measure::Evaluated;
 use lamella::plan::compile::Options;
+use lamella::plan::{OutputKind, Plan};
 use lamella::scenario::Settings;
 use lamella::source::Sources;
 
 struct Finished {
+    plan: Plan,
+    snapshots: Vec<Snapshot>,
     evaluated: Evaluated,
     outcome: Outcome,
 }
@@ -22,8 +25,12 @@ fn tell(report: &str) {
 }
 
 fn run(text: &str) -> Finished {
+    run_with(text, &Settings::default())
+}
+
+fn run_with(text: &str, settings: &Settings) -> Finished {
     let sources = Sources::single("scene.lam", text);
-    let checked = lamella::check(sources, &Settings::default(), &Options::default());
+    let checked = lamella::check(sources, settings, &Options::default());
     let compiled = checked.compiled.unwrap_or_else(|| panic!("no plan: {:#?}", checked.diagnostics));
     let mut snapshots: Vec<Snapshot> = Vec::new();
     let settings = EngineSettings::default();
@@ -34,7 +41,7 @@ fn run(text: &str) -> Finished {
     .expect("the scene runs");
     let evaluated = lamella::measure::evaluate(&compiled.plan, &compiled.evaluation, &snapshots, &outcome)
         .expect("results and references fit");
-    Finished { evaluated, outcome }
+    Finished { plan: compiled.plan, snapshots, evaluated, outcome }
 }
 
 impl Finished {
@@ -43,6 +50,25 @@ impl Finished {
         let value = found.expect("the scene has the measure").value;
         tell(&format!("{name} {value:.3e}"));
         value
+    }
+
+    /// Times and numbers of the only row of a species in outputs of a kind, by place.
+    fn rows(&self, kind: OutputKind, species: usize, place: Option<&str>) -> Vec<(f64, Vec<f64>)> {
+        let mut found = Vec::new();
+        for snapshot in &self.snapshots {
+            let output = &self.plan.outputs[snapshot.output_idx];
+            let Values::Rows(rows) = &snapshot.values else { continue };
+            if output.kind != kind {
+                continue;
+            }
+            let places = self.plan.places(output);
+            for row in rows.get(species).into_iter().flatten() {
+                if place.is_none_or(|place| places[usize::from(row.place)] == place) {
+                    found.push((snapshot.t / 86_400.0, row.numbers.clone()));
+                }
+            }
+        }
+        found
     }
 
     fn keeps_its_books(&self) {
@@ -155,4 +181,117 @@ measure error   = linf(profile.A - across) / linf(across)
     assert!(finished.measure("error_B") < 1e-4);
     // 25 000 particles in the largest bin.
     assert!(finished.measure("error") < 0.03);
+}
+
+/// Ten fields of few particles: the scatter between fields is what limits the comparison.
+///
+/// Theory: Dagan's variances with σ² = 0.25, λ = 5 m, U = 1 m/d, and 2 α U t with α = 0.05 m, worked out with
+/// mpmath 1.3 to 30 digits from the equation in the experiment's README.
+#[test]
+fn a_heterogeneous_aquifer_spreads_a_line_as_theory_says() {
+    let text = include_str!("../experiments/macrodispersion/macrodispersion.lam");
+    let text = edited(text, "100_000", "20_000");
+    let fields: Vec<Finished> =
+        (1..=10).map(|seed| run_with(&text, &Settings { seed: Some(seed), ..Settings::default() })).collect();
+    for (t, theory) in [(20.0, 23.423_767_351_0), (50.0, 85.191_251_483_7), (100.0, 202.335_351_154_1)] {
+        let numbers: Vec<Vec<f64>> = fields
+            .iter()
+            .map(|field| {
+                field.keeps_its_books();
+                let rows = field.rows(OutputKind::Moments, 0, None);
+                rows.into_iter().find(|(at, _)| (at - t).abs() < 1e-9).expect("moments at this time").1
+            })
+            .collect();
+        let n = numbers.len() as f64;
+        let mean = |k: usize| numbers.iter().map(|row| row[k]).sum::<f64>() / n;
+        // Amount, means along x, y, z, then the variance along x.
+        let (place, variance) = (mean(1) - 40.0, mean(4));
+        let scatter = numbers.iter().map(|row| (row[4] - variance).powi(2)).sum::<f64>() / (n - 1.0);
+        let error = (scatter / n).sqrt();
+        tell(&format!(
+            "{t} d: moved {place:.1} m, variance {variance:.1} ± {error:.1} m², theory {theory:.1}"
+        ));
+        assert!((place / t - 1.0).abs() < 0.05);
+        assert!((variance - theory).abs() < 3.0 * error && error < 0.15 * theory);
+    }
+}
+
+#[test]
+fn a_spill_between_wells_keeps_its_books() {
+    let text = include_str!("../experiments/lognormal_aquifer_2d/lognormal_aquifer_2d.lam");
+    let text =
+        edited(&edited(text, "S 60_000, O 120_000", "S 20_000, O 40_000"), "run to 200 d", "run to 50 d");
+    let text = edited(&text, "at t = 50 d, 200 d on", "at t = 50 d on");
+    let finished = run(&text);
+    finished.keeps_its_books();
+    // What leaves at first is water of 8 mg/L; some 4000 particles of it a month.
+    let left = finished.rows(OutputKind::Breakthrough, 1, Some("right"));
+    let (t, last) = left.last().expect("a breakthrough");
+    let mean = last[2] / left.iter().map(|(_, numbers)| numbers[1]).fold(0.0, f64::max);
+    tell(&format!("{t} d: {} kg/m³ of oxygen leaves, {:.2e} kg in all, {mean:.2e} s", last[0], last[2]));
+    let concentrations: Vec<f64> = left.iter().skip(1).map(|(_, numbers)| numbers[0]).collect();
+    let mean = concentrations.iter().sum::<f64>() / concentrations.len() as f64;
+    assert!((mean / 0.008 - 1.0).abs() < 0.06, "{mean} kg/m³ of oxygen leaves");
+}
+
+#[test]
+fn a_spill_in_layers_is_diluted_and_passes_the_plane() {
+    let text = include_str!("../experiments/lognormal_aquifer_3d/lognormal_aquifer_3d.lam");
+    let finished = run(&edited(text, "200_000", "40_000"));
+    finished.keeps_its_books();
+    let indices = finished.rows(OutputKind::Dilution, 0, None);
+    let early: Vec<f64> = indices.iter().filter(|(t, _)| *t < 80.0).map(|(_, numbers)| numbers[0]).collect();
+    assert!(early.len() > 3 && early.windows(2).all(|pair| pair[1] > pair[0]), "{early:?}");
+    // Everything that has left through the side has passed the plane before.
+    let passed = finished.rows(OutputKind::Breakthrough, 0, None).last().expect("a breakthrough").1[2];
+    let left = 1.0 - finished.rows(OutputKind::Moments, 0, None).last().expect("moments").1[0];
+    tell(&format!("{passed:.3} kg passed, {left:.3} kg left"));
+    assert!(left > 0.2 && passed > left && passed <= 1.0 + 1e-12);
+}
+
+/// Water of one concentration enters, and a well takes it out: it stays as it is, and the well takes q c t.
+#[test]
+fn a_well_takes_out_what_its_water_carries() {
+    let scene = "lamella 1
+species A retardation 2, B
+domain rect x = 0 .. 20 m, y = 0 .. 8 m
+medium porosity 0.25
+flow darcy {
+  head left 10 m
+  no_flow right, bottom, top
+  conductivity 10 m/d
+  well pump at (16.3 m, 4.6 m) rate -4 m^2/d
+  grid 20 x 8
+}
+dispersion longitudinal 0.2 m, transverse 0.02 m, molecular 1e-4 m^2/d
+boundary left inflow A = 8 mg/L, B = 8 mg/L
+boundary right, bottom, top reflect
+initial A = 8 mg/L, B = 8 mg/L
+particles mass A 100_000, B 100_000 stratified
+run to 20 d, step auto(courant <= 0.05, dispersion <= 0.01)
+output map    A, B at t = 20 d on 20 x 8
+output total  A, B every 5 d
+output budget A, B every 20 d
+reference same_A   for A = 8 mg/L
+reference same_B   for B = 8 mg/L
+reference steady_B for total B = 0.25 * 160 m^2 * 8 mg/L
+reference steady_A for total A = 2 * 0.25 * 160 m^2 * 8 mg/L
+measure error_A = l2(map.A - same_A) / l2(same_A)
+measure error_B = l2(map.B - same_B) / l2(same_B)
+measure total_A = linf(total.A - steady_A) / linf(steady_A)
+measure total_B = linf(total.B - steady_B) / linf(steady_B)
+";
+    let finished = run(scene);
+    finished.keeps_its_books();
+    // 306 and 208 particles in each of 160 bins: 5.7 % and 6.9 %, each known to 6 % of itself.
+    assert!(finished.measure("error_A") < 0.07 && finished.measure("error_B") < 0.083);
+    // Half of the mass of A is there at the start, a third of that of B: 1e5 particles share it with what enters.
+    for (species, unit) in [(0, 1.28e-5), (1, 0.96e-5)] {
+        let taken = finished.rows(OutputKind::Budget, species, Some("pump")).last().expect("a budget").1[2];
+        let expected: f64 = 4.0 * 8e-3 * 20.0;
+        let scatter = (expected * unit).sqrt();
+        tell(&format!("taken {taken} kg of {expected}, scatter {scatter:.1e}"));
+        assert!((taken - expected).abs() < 4.0 * scatter);
+    }
+    assert!(finished.measure("total_A") < 0.015 && finished.measure("total_B") < 0.015);
 }

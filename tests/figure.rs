@@ -40,6 +40,7 @@ fn column() -> (Plan, Vec<Snapshot>, Vec<Curve>) {
         bins: if bins > 0 { vec![bins] } else { Vec::new() },
         times: times.to_vec(),
         unit: None,
+        station: None,
     };
     plan.outputs = vec![
         output(OutputKind::Profile, vec![Quantity::Species(0), Quantity::Species(2)], N_BINS, &TIMES),
@@ -138,6 +139,7 @@ fn a_map_is_drawn_as_coloured_cells() {
         bins: vec![n.0, n.1],
         times: vec![86_400.0 * 50.0],
         unit: None,
+        station: None,
     }];
     let value = |k: usize| {
         let (x, y) = ((k / n.1) as f64 / n.0 as f64 - 0.4, (k % n.1) as f64 / n.1 as f64 - 0.5);
@@ -179,7 +181,7 @@ fn values_out_of_all_bounds_are_drawn_without_panic() {
                 Values::Covariance { covariance, .. } => covariance[0].fill(value),
                 Values::Total { amount } => amount[0] = value,
                 Values::Mixing(states) => states[0].gamma = value,
-                Values::Particles { .. } => {}
+                Values::Rows(_) | Values::Particles { .. } => {}
             }
         }
         curves.iter_mut().for_each(|curve| curve.y[k] = value);

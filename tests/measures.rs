@@ -288,3 +288,33 @@ measure named  = growth * 2
     assert_eq!(**square, Scalar::Binary(Binary::Power, size, number(2.0)));
     assert_eq!(named.value, Scalar::Binary(Binary::Multiply, Box::new(Scalar::Measure(0)), number(2.0)));
 }
+
+/// Amount, spread and volume of a normal pulse over time: `moments` and `dilution` by name.
+#[test]
+fn outputs_in_rows_have_measures_and_references() {
+    let scene = "lamella 1
+let D = 0.1 m^2/s
+let c0 = 1 mol/m^3
+species A
+domain line x = -20 m .. 20 m
+boundary left, right reflect
+dispersion D
+initial A = c0 * exp(-(x / 1 m)^2)
+particles fluid 100000 stratified
+run to 10 s, step 2 s
+seed 3
+output moments  A every 5 s
+output dilution A at t = 3 s, 10 s on 400
+reference whole  for moments A  = c0 * 1 m * sqrt(pi)
+reference volume for dilution A = sqrt(2 * pi * exp(1) * (0.5 m^2 + 2 * D * t))
+measure amount = mean(moments.A)
+measure amount_error = linf(moments.A - whole) / linf(whole)
+measure volume_error = linf(dilution.A - volume) / linf(volume)
+measure largest = linf(dilution.A)
+";
+    let found = measures_of(scene);
+    assert!((found[0] / std::f64::consts::PI.sqrt() - 1.0).abs() < 1e-3, "{found:?}");
+    assert!(found[1] < 1e-3 && found[2] > 0.0 && found[2] < 0.02, "{found:?}");
+    let exact = (2.0 * std::f64::consts::PI * std::f64::consts::E * 2.5).sqrt();
+    assert!((found[3] / exact - 1.0).abs() < 0.02, "{found:?}");
+}

@@ -68,6 +68,9 @@ fn columns(values: &Values) -> Vec<Vec<f64>> {
         Values::Particles { positions, concentrations } => {
             positions.iter().chain(concentrations).cloned().collect()
         }
+        Values::Rows(rows) => {
+            rows.iter().map(|rows| rows.iter().flat_map(|row| row.numbers.clone()).collect()).collect()
+        }
     }
 }
 

@@ -40,6 +40,7 @@ fn plan() -> Plan {
         bins: if bins > 0 { vec![bins] } else { Vec::new() },
         times: times.to_vec(),
         unit: None,
+        station: None,
     };
     let times = [2.0, 4.0, 8.0, 16.0];
     plan.outputs = vec![

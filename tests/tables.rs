@@ -1,6 +1,8 @@
 //! What a run's folder promises: whole or absent, the same bytes every time, readable by others.
 
 mod common;
+#[path = "common/rows.rs"]
+mod rows;
 
 use arrow_array::Array;
 use arrow_array::cast::AsArray;
@@ -8,6 +10,7 @@ use arrow_array::types::Float64Type;
 use lamella::engine::snapshot::{Snapshot, Values};
 use lamella::plan::{OutputKind, Plan, Quantity};
 use lamella::table::{Summary, TableError, Writer, is_complete, read};
+use rows::{with_rows, with_snapshots_of_rows};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
@@ -305,8 +308,8 @@ fn other_tools_read_every_table() {
     };
     let parent = tempfile::tempdir().unwrap();
     let (first, second) = (parent.path().join("first"), parent.path().join("it's second"));
-    write(&first);
-    write_plan(&second, &other_plan(), &common::snapshots());
+    write_plan(&first, &with_rows(common::plan()), &with_snapshots_of_rows());
+    write_plan(&second, &with_rows(other_plan()), &with_snapshots_of_rows());
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let output = std::process::Command::new(python)
         .arg(root.join("tests/python/open_tables.py"))
@@ -316,7 +319,68 @@ fn other_tools_read_every_table() {
         .unwrap();
     let text = String::from_utf8_lossy(&output.stdout);
     assert!(output.status.success(), "{text}{}", String::from_utf8_lossy(&output.stderr));
-    assert!(text.contains("7 tables read across 2 runs; 0 failures"), "{text}");
+    assert!(text.contains("12 tables read across 2 runs; 0 failures"), "{text}");
+}
+
+/// Columns of rows: places by word and position, unknown numbers null, units by species.
+#[test]
+fn outputs_in_rows_have_places_and_units() {
+    let folder = tempfile::tempdir().unwrap();
+    write_plan(folder.path(), &with_rows(common::plan()), &with_snapshots_of_rows());
+    let text = |table: &str| shown(&folder.path().join(table).join("part-0000.parquet"));
+    let through = text("breakthrough");
+    // Two outputs, two times, two species.
+    assert_eq!(through.len(), 8);
+    let first = "t=0 place=plane x=0.05 y= z= species=A concentration=0 rate= cumulative=2 n_particles=3 amount_unit=mol/m unit=mol/m^3 output=7";
+    assert_eq!(through[0], first);
+    let boxed = "t=20 place=box x=0 y=-0.0025 z= species=biomass concentration=20 rate=21 cumulative=22 n_particles=23 amount_unit=kg/m unit=kg/m^3 output=8";
+    assert_eq!(through[7], boxed);
+    let budget = text("budget");
+    assert_eq!(budget.len(), 28);
+    assert!(
+        budget[0].starts_with("t=0 place=initial species=A amount=0 entered= left=2 unit=mol/m"),
+        "{}",
+        budget[0]
+    );
+    assert!(budget[6].starts_with("t=0 place=defect"), "{}", budget[6]);
+    assert!(
+        text("dilution")[3].starts_with("t=20 species=biomass index=20 entropy=21 reactor_ratio=22 unit=m^2")
+    );
+    assert!(text("moments")[0].starts_with("t=0 species=A amount=0 mean_x= mean_y=2"));
+    assert!(
+        text("first_passage")[0].contains("cumulative=0 rate= n_particles=2 amount_unit=mol/m unit=mol/m")
+    );
+}
+
+/// Rows as text, without point and replicate.
+fn shown(file: &Path) -> Vec<String> {
+    let reader =
+        parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder::try_new(fs::File::open(file).unwrap());
+    let mut rows = Vec::new();
+    for batch in reader.unwrap().build().unwrap() {
+        let batch = batch.unwrap();
+        let schema = batch.schema();
+        for row in 0..batch.num_rows() {
+            let cells = schema.fields().iter().zip(batch.columns()).skip(2).map(|(field, column)| {
+                use arrow_array::types::{UInt16Type, UInt64Type};
+                let value = if column.is_null(row) {
+                    String::new()
+                } else if let Some(values) = column.as_primitive_opt::<Float64Type>() {
+                    values.value(row).to_string()
+                } else if let Some(values) = column.as_primitive_opt::<UInt64Type>() {
+                    values.value(row).to_string()
+                } else if let Some(values) = column.as_primitive_opt::<UInt16Type>() {
+                    values.value(row).to_string()
+                } else {
+                    let words = column.as_dictionary::<UInt16Type>();
+                    words.values().as_string::<i32>().value(words.keys().value(row).into()).to_owned()
+                };
+                format!("{}={value}", field.name())
+            });
+            rows.push(cells.collect::<Vec<_>>().join(" "));
+        }
+    }
+    rows
 }
 
 /// The same outputs with the species in another order and one more in front, so that every number in

@@ -133,6 +133,7 @@ codes! {
     M029 "a flow that makes or loses water",
     M030 "a Darcy flow without a solution",
     M031 "a source that cannot be",
+    M032 "an output that needs particles with mass",
     N101 "means over few particles are mostly noise",
     N102 "the step is coarse for a mixing zone",
     N103 "the bins add dispersion",

@@ -31,7 +31,8 @@ pub use control::{Control, Settings, Unattended};
 pub use error::RunError;
 use snapshot::{Outcome, Snapshot};
 
-/// Runs a plan and hands every snapshot to `sink`, in the order of time, then of outputs.
+/// Runs a plan and hands every snapshot to `sink`: those of one output in the order of time, those of one time in
+/// the order of outputs. What passes a place between two steps is known, and handed out, after the second one.
 ///
 /// The bytes of the snapshots depend on the plan alone: not on threads, not on other outputs.
 pub fn run(

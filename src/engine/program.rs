@@ -290,7 +290,7 @@ fn check_indices(plan: &Plan, n_axes: usize) -> Result<(), RunError> {
             Quantity::Species(species) => !is_pair && species < n_species,
             Quantity::Pair(a, b) => is_pair && a < n_species && b < n_species,
         });
-        let needs_bins = !matches!(output.kind, OutputKind::Total | OutputKind::Particles);
+        let needs_bins = output.kind.has_bins();
         let is_binned = !needs_bins || output.bins.len() == n_axes;
         let is_immobile = |species: usize| plan.species[species].terms.iter().any(|&(k, _)| k >= n_mobile);
         let is_mixing_sound = output.kind != OutputKind::Mixing
@@ -298,7 +298,8 @@ fn check_indices(plan: &Plan, n_axes: usize) -> Result<(), RunError> {
                 Quantity::Pair(a, b) => !is_immobile(a) && !is_immobile(b),
                 Quantity::Species(_) => false,
             });
-        if !is_quantity_sound || !is_binned || !is_mixing_sound {
+        let has_fluid = !output.kind.needs_masses();
+        if !has_fluid || !is_quantity_sound || !is_binned || !is_mixing_sound {
             return Err(unsound("an output whose species or bins do not fit"));
         }
     }

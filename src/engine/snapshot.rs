@@ -30,6 +30,16 @@ pub enum Values {
     Mixing(Vec<MixingState>),
     /// Positions per active axis and concentrations per species, in the order of particles.
     Particles { positions: Vec<Vec<f64>>, concentrations: Vec<Vec<f64>> },
+    /// Per species one row or several of the numbers that the output's kind lists.
+    Rows(Vec<Vec<Row>>),
+}
+
+/// Numbers of one place; one that is none is unknown.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// Index into the places of the output.
+    pub place: u16,
+    pub numbers: Vec<f64>,
 }
 
 impl Values {
@@ -54,6 +64,9 @@ impl Values {
             Self::Particles { concentrations, .. } => {
                 concentrations.iter().position(|column| column.iter().any(|value| !value.is_finite()))
             }
+            Self::Rows(rows) => rows
+                .iter()
+                .position(|rows| rows.iter().any(|row| row.numbers.iter().any(|value| value.is_infinite()))),
         }
     }
 }

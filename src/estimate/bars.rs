@@ -25,7 +25,7 @@ pub fn bars(
 ) -> Result<Vec<ErrorBar>, String> {
     let mut bars = Vec::new();
     for (output_idx, output) in plan.outputs.iter().enumerate() {
-        if output.kind == OutputKind::Particles {
+        if !output.kind.is_binned() && !output.kind.is_course() {
             continue;
         }
         for &quantity in &output.quantities {
@@ -224,7 +224,7 @@ impl<'a> Seen<'a> {
 
 /// One value at each time, none in bins.
 fn is_scalar(kind: OutputKind) -> bool {
-    matches!(kind, OutputKind::Total | OutputKind::Mixing)
+    kind.is_course()
 }
 
 /// Values over twice as many bins along each axis as `bins`, averaged to those; the first axis is the

@@ -118,10 +118,11 @@ fn fewer(plan: &Plan) -> Plan {
     plan
 }
 
-/// The plan without times for outputs of single particles, which have no error bar.
+/// The plan without times for outputs that have no error bar: single particles, budgets.
 fn watched(plan: &Plan) -> Plan {
     let mut plan = plan.clone();
-    let single = plan.outputs.iter_mut().filter(|output| output.kind == OutputKind::Particles);
+    let has_bar = |kind: OutputKind| kind.is_binned() || kind.is_course();
+    let single = plan.outputs.iter_mut().filter(|output| !has_bar(output.kind));
     single.for_each(|output| output.times.clear());
     plan
 }

@@ -87,10 +87,7 @@ impl Grid {
 
 /// Whether an output has values per bin.
 pub(super) fn is_binned(kind: OutputKind) -> bool {
-    match kind {
-        OutputKind::Profile | OutputKind::Covariance | OutputKind::Map => true,
-        OutputKind::Total | OutputKind::Mixing | OutputKind::Particles => false,
-    }
+    kind.is_binned()
 }
 
 /// A profile is integrated along its axis only, a map over all axes.

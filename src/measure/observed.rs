@@ -42,6 +42,7 @@ impl Run<'_> {
                 && column(output, quantity).is_some()
                 && output.bins == like.bins
                 && output.times == like.times
+                && output.station == like.station
         })
     }
 
@@ -98,6 +99,11 @@ fn observed(plan: &Plan, snapshot: &Snapshot, column: usize, n_bins: usize) -> R
             (vec![state.gamma], None, vec![!(state.gamma.is_nan() && state.m_mean.is_finite())])
         }),
         Values::Particles { .. } => None,
+        // The first number of the only row; it may have no value, as a concentration where no water flows.
+        Values::Rows(rows) => match rows.get(column).map(Vec::as_slice) {
+            Some([row]) => row.numbers.first().map(|&value| (vec![value], None, vec![!value.is_nan()])),
+            _ => None,
+        },
     };
     match found {
         Some((values, standard_errors, is_filled)) if values.len() == n_bins && is_filled.len() == n_bins => {

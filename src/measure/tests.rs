@@ -33,7 +33,7 @@ fn plan(axes: Vec<Axis>, outputs: Vec<Output>) -> Plan {
 }
 
 fn output(kind: OutputKind, quantities: Vec<Quantity>, bins: Vec<usize>, times: &[f64]) -> Output {
-    Output { kind, quantities, bins, times: times.to_vec(), unit: None }
+    Output { kind, quantities, bins, times: times.to_vec(), unit: None, station: None }
 }
 
 fn outcome() -> Outcome {

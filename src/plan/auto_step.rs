@@ -67,7 +67,10 @@ pub(super) fn of_masses(
 }
 
 /// Steps shorter than a given one that are tried.
-const TRIED: u64 = 10_000;
+const TRIED: usize = 10_000;
+/// Times of outputs that are looked at in all of them.
+const MOST_LOOKS: usize = 20_000_000;
+const MOST_STEPS: f64 = 1e12;
 /// As near as this, in steps, an output is at a step.
 const AT_A_STEP: f64 = 1e-9;
 
@@ -76,15 +79,13 @@ const AT_A_STEP: f64 = 1e-9;
 pub(super) fn fitting(outputs: &[Output], step: f64, duration: f64) -> Option<f64> {
     let fewest = (duration / step * (1.0 - 1e-12)).ceil().max(1.0);
     let is_fine = |n: f64| times_between(outputs, duration / n).next().is_none();
-    let most = (8.0 * fewest + 1000.0).min(fewest + TRIED as f64);
-    let mut n = fewest;
-    while n <= most {
-        if is_fine(n) {
-            return Some(duration / n);
-        }
-        n += 1.0;
+    // Beyond that many steps nobody runs, and whole numbers of steps cannot be told apart.
+    if fewest > MOST_STEPS {
+        return None;
     }
-    None
+    let n_times: usize = outputs.iter().map(|output| output.times.len()).sum();
+    let tried = ((7.0 * fewest + 1000.0) as usize).min(TRIED).min(MOST_LOOKS / n_times.max(1));
+    (0..=tried).map(|k| fewest + k as f64).find(|&n| is_fine(n)).map(|n| duration / n)
 }
 
 /// Times of outputs that fall between two steps, each with its output.
@@ -129,4 +130,35 @@ fn bin_sizes(axes: &[Axis], outputs: &[Output]) -> Vec<f64> {
         (axis.high - axis.low) / if bins > 1.0 { bins } else { PARTS }
     };
     axes.iter().enumerate().map(of).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn outputs(times: &[f64]) -> Vec<Output> {
+        vec![Output {
+            kind: super::super::OutputKind::Total,
+            quantities: vec![],
+            times: times.to_vec(),
+            bins: vec![],
+            station: None,
+            unit: None,
+        }]
+    }
+
+    #[test]
+    fn steps_meet_the_times_of_outputs() {
+        // 12 steps of 8.33 do not meet 30 and 45; 20 steps of 5 do.
+        assert_eq!(fitting(&outputs(&[30.0, 45.0, 100.0]), 100.0 / 12.0, 100.0), Some(5.0));
+        assert_eq!(fitting(&outputs(&[std::f64::consts::PI]), 1.0, 100.0), None);
+    }
+
+    /// Numbers of steps that cannot be told from the next one end, too.
+    #[test]
+    fn tiny_steps_are_given_up_at_once() {
+        for step in [1e-9, 1e-18, 1e-300, f64::MIN_POSITIVE] {
+            assert_eq!(fitting(&outputs(&[0.3, 1.0]), step, 1e6), None, "{step:e}");
+        }
+    }
 }

@@ -3,7 +3,7 @@
 //! Passes are held to this, and so is a plan that was read from a file.
 
 use super::tape::{Operation, Tape};
-use super::{Output, OutputKind, Plan, Quantity, Side, ZoneRate};
+use super::{Output, Plan, Quantity, Side, ZoneRate, station};
 
 impl Plan {
     /// One sentence about the first thing that is wrong.
@@ -88,7 +88,13 @@ impl Plan {
             };
             require(is_right, || format!("an output `{}` names what is not there", output.kind.word()))?;
         }
-        let wants_bins = !matches!(output.kind, OutputKind::Total | OutputKind::Particles);
+        let wants_bins = output.kind.has_bins();
+        let has_station = output.station.is_some() == output.kind.has_station();
+        let is_right = has_station
+            && output.station.as_ref().is_none_or(|station| station::fits(station, self.axes.len()));
+        require(is_right, || format!("an output `{}` is taken at no place", output.kind.word()))?;
+        let is_right = self.transport.is_some() || !output.kind.needs_masses();
+        require(is_right, || format!("an output `{}` needs particles with mass", output.kind.word()))?;
         let n_bins = if wants_bins { self.axes.len() } else { 0 };
         let is_right = output.bins.len() == n_bins && output.bins.iter().all(|bins| *bins >= 1);
         require(is_right, || format!("an output `{}` has wrong bins", output.kind.word()))?;

@@ -182,7 +182,7 @@ fn binned_values(output: &Output) -> f64 {
         OutputKind::Profile | OutputKind::Map | OutputKind::Covariance => {
             n_bins(output) * output.quantities.len() as f64
         }
-        OutputKind::Total | OutputKind::Mixing | OutputKind::Particles => 0.0,
+        _ => 0.0,
     }
 }
 
@@ -200,7 +200,8 @@ fn numbers_per_bin(plan: &Plan, output: &Output) -> [f64; 3] {
             [1.0 + 2.0 * n_quantities, 1.0 + n_quantities * (1.0 + n_slopes), n_quantities]
         }
         OutputKind::Covariance => [1.0 + n_quantities, 1.0 + 2.0 * n_quantities, n_quantities],
-        OutputKind::Total | OutputKind::Mixing | OutputKind::Particles => [0.0; 3],
+        OutputKind::Dilution => [0.0, n_quantities, 0.0],
+        _ => [0.0; 3],
     }
 }
 
@@ -209,11 +210,19 @@ fn output_bytes(plan: &Plan) -> u64 {
     let mut largest: f64 = 0.0;
     for output in &plan.outputs {
         let [values, first, second] = numbers_per_bin(plan, output).map(|n| 8.0 * n * n_bins(output));
-        kept += values * output.times.len() as f64;
+        kept += (values + row_bytes(plan, output)) * output.times.len() as f64;
         // Sums of groups of blocks beside what they are added to, first in one pass and then in the other.
         largest = largest.max((2.0 * first).max(first + 2.0 * second) - values).max(first + second);
     }
     (kept + largest) as u64 + particle_output_bytes(plan)
+}
+
+/// Bytes of the rows of one time, and of the bin of time that they are summed in.
+fn row_bytes(plan: &Plan, output: &Output) -> f64 {
+    let n_rows = if output.kind == OutputKind::Budget { plan.places(output).len() } else { 1 };
+    let numbers = output.kind.numbers().len();
+    let summed = if output.kind.has_station() { 3 } else { 0 };
+    if numbers == 0 { 0.0 } else { (8 * output.quantities.len() * (n_rows * (numbers + 4) + summed)) as f64 }
 }
 
 /// Bytes that one whole observation of every particle takes while it is written.

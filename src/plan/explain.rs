@@ -211,9 +211,19 @@ fn output_lines(plan: &Plan) -> Vec<String> {
                 format!("at {} times from {} to {} s", output.times.len(), number(*first), number(*last))
             }
         };
-        format!("{} of {}{on}, {times}", output.kind.word(), quantities.join(", "))
+        let place = place_text(plan, output);
+        format!("{} of {}{place}{on}, {times}", output.kind.word(), quantities.join(", "))
     };
     plan.outputs.iter().map(line).collect()
+}
+
+/// Where an output is taken.
+fn place_text(plan: &Plan, output: &super::Output) -> String {
+    let Some(station) = &output.station else { return String::new() };
+    let words = plan.places(output).join(", ");
+    let known = ["x", "y", "z"].iter().zip(plan.position(station)).filter_map(|(name, at)| Some((name, at?)));
+    let position: Vec<String> = known.map(|(name, at)| format!("{name} = {} m", number(at))).collect();
+    format!(" at {words} ({})", position.join(", "))
 }
 
 fn cost_lines(compiled: &Compiled) -> Vec<String> {

@@ -214,6 +214,7 @@ fn lower_output(output: &scenario::Output) -> Output {
         bins: output.bins.clone(),
         times: output.times.clone(),
         unit: output.unit.as_ref().map(|(text, factor)| OutputUnit { text: text.clone(), factor: *factor }),
+        station: output.station.clone(),
     }
 }
 
@@ -233,7 +234,7 @@ fn evaluation(scenario: &Scenario, problems: &mut Vec<Diagnostic>) -> Evaluation
             },
         };
         let target = match reference.target {
-            scenario::Target::Concentration(a) | scenario::Target::Total(a) => Quantity::Species(a),
+            scenario::Target::Concentration(a) | scenario::Target::Course(_, a) => Quantity::Species(a),
             scenario::Target::Covariance(a, b) | scenario::Target::Mixing(a, b) => Quantity::Pair(a, b),
         };
         let outputs = reference.target.outputs().to_vec();

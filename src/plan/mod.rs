@@ -29,12 +29,13 @@ mod method;
 pub mod passes;
 mod reaction_limits;
 mod shares;
+pub mod station;
 pub mod tape;
 pub mod time_scales;
 pub mod transport;
 mod transport_limits;
 
-pub use crate::scenario::{OutputKind, Placement, Side};
+pub use crate::scenario::{OutputKind, Placement, Side, Station};
 pub use compile::{Compiled, Options, Selection, compile, hash};
 
 use chemistry::Chemistry;
@@ -233,6 +234,9 @@ pub struct Output {
     pub times: Vec<f64>,
     /// Unit of the values as written by the user; `None` is SI.
     pub unit: Option<OutputUnit>,
+    /// Where a breakthrough or a first passage is taken.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub station: Option<Station>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

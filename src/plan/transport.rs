@@ -31,6 +31,14 @@ pub struct Transport {
     pub interfaces: Vec<Interface>,
 }
 
+impl Transport {
+    /// Wells that take water out, and what is in it.
+    pub fn drains(&self) -> Vec<&Well> {
+        let Flow::Darcy(flow) = &self.flow else { return Vec::new() };
+        flow.wells.iter().filter(|well| well.rate < 0.0).collect()
+    }
+}
+
 /// Where the water goes. Velocities are those of the water in its pores, relative to the frame.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -66,7 +66,9 @@ pub fn value(plan: &Plan, output: &Output, quantity: Quantity, n_axes: usize, la
     let dimension = value_dimension(plan, output.kind, quantity, n_axes);
     match (output.kind, quantity) {
         (OutputKind::Covariance, _) => squared(dimension, largest),
-        (OutputKind::Total, _) => amount(dimension, n_axes, largest),
+        (OutputKind::Total | OutputKind::FirstPassage | OutputKind::Moments | OutputKind::Budget, _) => {
+            amount(dimension, n_axes, largest)
+        }
         _ if dimension == Dimension::MOLAR_CONCENTRATION => step(MOLAR, largest),
         _ if dimension == Dimension::MASS_CONCENTRATION => step(MASSES, largest),
         _ => Shown::new(1.0, &raised(&si_text(dimension))),

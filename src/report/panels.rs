@@ -66,8 +66,11 @@ impl<'a> Story<'a> {
                 OutputKind::Map => {
                     panels.extend(quantities().filter_map(|(q, _)| self.map(output_idx, output, q)));
                 }
-                OutputKind::Total | OutputKind::Mixing => panels.extend(self.courses(output_idx, output)),
+                OutputKind::Budget => {
+                    panels.extend(quantities().filter_map(|(q, _)| self.budget(output_idx, output, q)));
+                }
                 OutputKind::Particles => {}
+                _ => panels.extend(self.courses(output_idx, output)),
             }
         }
         panels
@@ -211,15 +214,69 @@ impl<'a> Story<'a> {
         let spacing = |is_wide: bool| if is_mixing && is_wide { Spacing::Log } else { Spacing::Linear };
         let names: Vec<String> = group.iter().map(|q| self.names(output.quantities[*q])).collect();
         Some(Panel {
-            title: if is_mixing {
-                format!("γ({})", names.join("; "))
-            } else {
-                format!("total {}", names.join(", "))
+            title: match output.kind {
+                OutputKind::Mixing => format!("γ({})", names.join("; ")),
+                OutputKind::Total => format!("total {}", names.join(", ")),
+                kind => format!("{} {}{}", course_name(kind), names.join(", "), self.station(output)),
             },
             x_label: labelled("time", &self.time_unit.text),
-            y_label: if is_mixing { "γ".to_owned() } else { labelled("amount", &shown.text) },
+            y_label: if is_mixing {
+                "γ".to_owned()
+            } else {
+                labelled(course_value(output.kind), &shown.text)
+            },
             x: Scale::covering(times_of(&marks), spacing(is_wide(times_of(&marks)))),
             y: Scale::covering(values_of(&marks), spacing(is_wide(values_of(&marks)))),
+            marks,
+            heat: None,
+            key,
+            notes: Vec::new(),
+        })
+    }
+
+    /// Where a course is taken.
+    fn station(&self, output: &Output) -> String {
+        let Some(station) = &output.station else { return String::new() };
+        let position = self.plan.position(station);
+        let known = AXES.iter().zip(position).filter_map(|(name, at)| Some((name, at?)));
+        let text: Vec<String> =
+            known.map(|(name, at)| format!("{name} = {} m", crate::diagnostic::number(at))).collect();
+        format!(" at {}", text.join(", "))
+    }
+
+    /// What is there and what came and went, over time: a line of dots for each place that has any.
+    fn budget(&self, output_idx: usize, output: &Output, q: usize) -> Option<Panel> {
+        let places = self.plan.places(output);
+        let mut series: Vec<(usize, Vec<(f64, f64)>)> = Vec::new();
+        for snapshot in self.of_output(output_idx) {
+            let Values::Rows(rows) = &snapshot.values else { continue };
+            for row in rows.get(q)?.iter().filter(|row| usize::from(row.place) + 1 < places.len()) {
+                let point = (snapshot.t, *row.numbers.first()?);
+                match series.iter_mut().find(|(place, _)| *place == usize::from(row.place)) {
+                    Some((_, points)) => points.push(point),
+                    None => series.push((row.place.into(), vec![point])),
+                }
+            }
+        }
+        series.retain(|(_, points)| points.iter().any(|point| point.1 != 0.0));
+        let (mut marks, mut key) = (Vec::new(), Vec::new());
+        for (idx, (place, points)) in series.into_iter().enumerate() {
+            let color = SERIES[idx % SERIES.len()];
+            let every = points.len().div_ceil(MOST_DOTS).max(1);
+            marks.push(Mark { points: points.into_iter().step_by(every).collect(), color, look: Look::Dots });
+            key.push(KeyEntry { text: places[place].clone(), color, look: Look::Dots });
+        }
+        if marks.iter().all(|mark| mark.points.len() < 2) {
+            return None;
+        }
+        let shown = display::value(self.plan, output, output.quantities[q], self.n_axes, largest(&marks));
+        rescale(&mut marks, self.time_unit.factor, shown.factor);
+        Some(Panel {
+            title: format!("budget of {}", self.names(output.quantities[q])),
+            x_label: labelled("time", &self.time_unit.text),
+            y_label: labelled("amount", &shown.text),
+            x: Scale::covering(times_of(&marks), Spacing::Linear),
+            y: Scale::covering(values_of(&marks), Spacing::Linear),
             marks,
             heat: None,
             key,
@@ -240,8 +297,10 @@ impl<'a> Story<'a> {
             let quantity = output.quantities[q];
             let color = if group.len() > 1 { SERIES[place % SERIES.len()] } else { FAINT };
             let snapshots = self.of_output(output_idx);
-            let points: Vec<_> =
-                snapshots.map(|snapshot| (snapshot.t, value_at(&snapshot.values, q))).collect();
+            let points: Vec<_> = snapshots
+                .map(|snapshot| (snapshot.t, value_at(&snapshot.values, q)))
+                .filter(|p| !p.1.is_nan())
+                .collect();
             let every = points.len().div_ceil(MOST_DOTS).max(1);
             marks.push(Mark { points: points.into_iter().step_by(every).collect(), color, look: Look::Dots });
             key.push(KeyEntry { text: self.names(quantity), color, look: Look::Dots });
@@ -349,7 +408,28 @@ fn value_at(values: &Values, q: usize) -> f64 {
     match values {
         Values::Total { amount } => amount.get(q).copied().unwrap_or(f64::NAN),
         Values::Mixing(states) => states.get(q).map_or(f64::NAN, |state| state.gamma),
+        Values::Rows(rows) => {
+            rows.get(q).and_then(|rows| rows.first()?.numbers.first().copied()).unwrap_or(f64::NAN)
+        }
         _ => f64::NAN,
+    }
+}
+
+fn course_name(kind: OutputKind) -> &'static str {
+    match kind {
+        OutputKind::Breakthrough => "breakthrough of",
+        OutputKind::FirstPassage => "first passage of",
+        OutputKind::Dilution => "dilution of",
+        _ => "amount of",
+    }
+}
+
+/// What the number of a course is.
+fn course_value(kind: OutputKind) -> &'static str {
+    match kind {
+        OutputKind::Breakthrough => "concentration",
+        OutputKind::Dilution => "dilution index",
+        _ => "amount",
     }
 }
 

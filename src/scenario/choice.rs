@@ -1,7 +1,7 @@
 //! Choices among words that go into the plan as they are.
 //!
-//! Owns the types and their words. May use `serde`, as the plan is written. It deliberately holds no
-//! numbers and no places.
+//! Owns the types and their words. May use `serde`, as the plan is written. It deliberately checks
+//! nothing.
 
 use serde::{Deserialize, Serialize};
 
@@ -105,6 +105,18 @@ pub enum Integrator {
 pub(super) const INTEGRATORS: &[(&str, Integrator)] =
     &[("auto", Integrator::Auto), ("explicit", Integrator::Explicit), ("rosenbrock", Integrator::Rosenbrock)];
 
+/// A place that is watched.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Station {
+    /// What goes through a plane normal to an active axis, net along it.
+    Plane { axis: usize, at: f64 },
+    /// What leaves through a side (twice the active axis, plus one at its upper end), net of what enters.
+    Side(usize),
+    /// What is in a box: limits per active axis, m.
+    Box { low: Vec<f64>, high: Vec<f64> },
+}
+
 /// What is observed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -121,6 +133,16 @@ pub enum OutputKind {
     Mixing,
     /// Every particle with position and concentrations.
     Particles,
+    /// What passes a plane or a side, or is in a box, between two times.
+    Breakthrough,
+    /// What has touched a plane, each particle once.
+    FirstPassage,
+    /// Amount, centre and second central moments.
+    Moments,
+    /// Volume that the amount is spread over, by its entropy.
+    Dilution,
+    /// What has entered and left, by where, and what is there.
+    Budget,
 }
 
 pub(super) const OUTPUTS: &[(&str, OutputKind)] = &[
@@ -130,6 +152,11 @@ pub(super) const OUTPUTS: &[(&str, OutputKind)] = &[
     ("total", OutputKind::Total),
     ("mixing", OutputKind::Mixing),
     ("particles", OutputKind::Particles),
+    ("breakthrough", OutputKind::Breakthrough),
+    ("first_passage", OutputKind::FirstPassage),
+    ("moments", OutputKind::Moments),
+    ("dilution", OutputKind::Dilution),
+    ("budget", OutputKind::Budget),
 ];
 
 impl OutputKind {
@@ -141,6 +168,51 @@ impl OutputKind {
     /// Whether its values belong to pairs of species.
     pub fn is_of_pairs(self) -> bool {
         matches!(self, OutputKind::Covariance | OutputKind::Mixing)
+    }
+
+    /// Whether it has values in bins that a profile or a map is drawn of.
+    pub fn is_binned(self) -> bool {
+        matches!(self, OutputKind::Profile | OutputKind::Covariance | OutputKind::Map)
+    }
+
+    /// Whether it is summed over bins, which the scene has to state.
+    pub fn has_bins(self) -> bool {
+        self.is_binned() || matches!(self, OutputKind::Mixing | OutputKind::Dilution)
+    }
+
+    /// Whether there is one number for each quantity and time that measures, references and figures speak of.
+    pub fn is_course(self) -> bool {
+        matches!(
+            self,
+            OutputKind::Total
+                | OutputKind::Mixing
+                | OutputKind::Breakthrough
+                | OutputKind::FirstPassage
+                | OutputKind::Moments
+                | OutputKind::Dilution
+        )
+    }
+
+    /// Whether its values are numbers in named columns, in one row or several.
+    pub fn has_rows(self) -> bool {
+        matches!(
+            self,
+            OutputKind::Breakthrough
+                | OutputKind::FirstPassage
+                | OutputKind::Moments
+                | OutputKind::Dilution
+                | OutputKind::Budget
+        )
+    }
+
+    /// Whether it is taken at a station.
+    pub fn has_station(self) -> bool {
+        matches!(self, OutputKind::Breakthrough | OutputKind::FirstPassage)
+    }
+
+    /// Whether only particles that carry mass have it: what they do on their way is counted.
+    pub fn needs_masses(self) -> bool {
+        matches!(self, OutputKind::Breakthrough | OutputKind::FirstPassage | OutputKind::Budget)
     }
 }
 

@@ -260,8 +260,9 @@ fn build<'a>(
     let run = super::model::run(checker, statements);
     let duration = run.as_ref().map(|run| run.duration);
     let sources = super::transport::source::sources(checker, statements, duration, domain.as_ref());
+    let average = bins.as_ref().and_then(Option::as_ref);
     let (outputs, are_outputs_right) =
-        super::observe::outputs(checker, statements, duration, bins.as_ref().and_then(Option::as_ref));
+        super::observe::outputs(checker, statements, duration, average, domain.as_ref());
     let (references, are_references_right) = super::reference::references(checker, statements, &outputs);
     let (measures, are_measures_right) =
         super::measure::measures(checker, statements, &outputs, &references, duration, domain.as_ref());

@@ -28,6 +28,7 @@ mod results;
 mod scope;
 mod settings;
 mod slot;
+mod station;
 pub mod sweep;
 pub mod transport;
 mod unused;
@@ -39,7 +40,7 @@ use crate::units::Dimension;
 use expression::Expr;
 use transport::{Auto, Dispersion, Flow, Patch, Shares, Source};
 
-pub use choice::{Activity, Covariance, Integrator, OutputKind, Placement, Side, Splitting};
+pub use choice::{Activity, Covariance, Integrator, OutputKind, Placement, Side, Splitting, Station};
 pub use collect::resolve;
 pub use geometry::MAX_BINS;
 pub use measure::{Fact, Field, FieldTarget, Norm, Scalar};
@@ -274,6 +275,8 @@ pub struct Output {
     /// Bins per axis of the domain; empty where nothing is binned.
     pub bins: Vec<usize>,
     pub bins_span: Span,
+    /// Where a breakthrough or a first passage is taken.
+    pub station: Option<Station>,
     /// Unit text and factor to SI.
     pub unit: Option<(String, f64)>,
 }
@@ -292,7 +295,8 @@ pub enum Target {
     Concentration(usize),
     Covariance(usize, usize),
     Mixing(usize, usize),
-    Total(usize),
+    /// One number over time: a total, a breakthrough, …
+    Course(OutputKind, usize),
 }
 
 #[derive(Debug, Clone, PartialEq)]

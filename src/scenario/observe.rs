@@ -5,7 +5,7 @@ pub(super) use super::choice::OUTPUTS;
 use super::collect::Statements;
 use super::geometry::{count_of, grid};
 use super::model::species_index;
-use super::{Output, OutputKind};
+use super::{Domain, Output, OutputKind};
 use crate::diagnostic::codes::{D009, M001, M002, M004, U104, U105};
 use crate::diagnostic::{Diagnostic, precise};
 use crate::source::{Span, Spanned};
@@ -22,7 +22,11 @@ impl OutputKind {
         match self {
             OutputKind::Profile | OutputKind::Map | OutputKind::Particles => c,
             OutputKind::Covariance => c.times(c),
-            OutputKind::Total => c.times(volume),
+            OutputKind::Breakthrough => c,
+            OutputKind::Total | OutputKind::FirstPassage | OutputKind::Moments | OutputKind::Budget => {
+                c.times(volume)
+            }
+            OutputKind::Dilution => volume,
             OutputKind::Mixing => c.times(c).times(volume),
         }
     }
@@ -34,10 +38,11 @@ pub(super) fn outputs<'a>(
     statements: &Statements<'a>,
     duration: Option<f64>,
     bins: Option<&Spanned<Vec<usize>>>,
+    domain: Option<&Domain>,
 ) -> (Vec<Output>, bool) {
     let mut list = Vec::new();
     for (span, written) in &statements.outputs {
-        list.extend(output(checker, statements, *span, written, duration, bins));
+        list.extend(output(checker, statements, (*span, written), duration, bins, domain));
     }
     let is_right = list.len() == statements.outputs.len();
     (list, is_right)
@@ -46,16 +51,17 @@ pub(super) fn outputs<'a>(
 fn output<'a>(
     checker: &mut Checker<'a>,
     statements: &Statements<'a>,
-    span: Span,
-    written: &'a tree::Output,
+    (span, written): (Span, &'a tree::Output),
     duration: Option<f64>,
     average: Option<&Spanned<Vec<usize>>>,
+    domain: Option<&Domain>,
 ) -> Option<Output> {
     let kind = checker.word(&written.kind, "an output", OUTPUTS);
     let species = species_of(checker, written);
     let times = times(checker, span, written, duration);
     let (kind, species, times) = (kind?, species?, times?);
     let pairs = if kind.is_of_pairs() { pairs(&species) } else { Vec::new() };
+    let station = super::station::station(checker, statements, written, kind, domain)?;
     let along = along(checker, written, kind)?;
     let bins = output_bins(checker, statements, written, kind, along, average)?;
     let unit = match &written.unit {
@@ -63,7 +69,7 @@ fn output<'a>(
         Some(unit) => Some(output_unit(checker, unit, kind, &species)?),
     };
     let bins_span = written.grid.first().map_or(written.kind.span, |count| count.span);
-    Some(Output { span, kind, species, pairs, times, along, bins, bins_span, unit })
+    Some(Output { span, kind, species, pairs, times, along, bins, bins_span, station, unit })
 }
 
 fn species_of(checker: &mut Checker<'_>, written: &tree::Output) -> Option<Vec<usize>> {
@@ -187,6 +193,12 @@ fn along(checker: &mut Checker<'_>, written: &tree::Output, kind: OutputKind) ->
     }
 }
 
+/// Whether the output is a mean over a bin around a plane.
+fn is_slab(written: &tree::Output) -> bool {
+    written.averaging.as_ref().is_some_and(|name| name.value == "resident")
+        && matches!(written.place, Some(tree::Place::Plane(..)))
+}
+
 fn output_bins<'a>(
     checker: &mut Checker<'a>,
     statements: &Statements<'_>,
@@ -196,18 +208,18 @@ fn output_bins<'a>(
     average: Option<&Spanned<Vec<usize>>>,
 ) -> Option<Vec<usize>> {
     let place = written.grid.first().map_or(written.kind.span, |count| count.span);
-    let is_binned = !matches!(kind, OutputKind::Total | OutputKind::Particles | OutputKind::Mixing);
-    if !is_binned && !written.grid.is_empty() {
+    let takes_bins = kind.is_binned() || kind == OutputKind::Dilution || is_slab(written);
+    if !takes_bins && !written.grid.is_empty() {
         checker.report(
             Diagnostic::error(M004, format!("`on` has no meaning for `{}`", kind.word()))
                 .at(place, "bins here")
                 .found("a number of bins")
                 .expected("no `on`")
-                .help("`mixing` uses the bins of `average`; `total` and `particles` use none"),
+                .help("`mixing` uses the bins of `average`; others use none"),
         );
         return None;
     }
-    if matches!(kind, OutputKind::Total | OutputKind::Particles) {
+    if !kind.has_bins() {
         return Some(Vec::new());
     }
     if !written.grid.is_empty() {

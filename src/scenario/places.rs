@@ -94,7 +94,9 @@ pub(super) fn has_times(output: &Output, wanted: Option<&[f64]>) -> bool {
 impl Results {
     /// Distinct places among the outputs that pass a test.
     fn places(&self, test: impl Fn(&Output) -> bool) -> Vec<usize> {
-        let is_same = |a: &Output, b: &Output| a.kind == b.kind && a.bins == b.bins && a.times == b.times;
+        let is_same = |a: &Output, b: &Output| {
+            a.kind == b.kind && a.bins == b.bins && a.times == b.times && a.station == b.station
+        };
         let first = |output: &Output| self.outputs.iter().position(|other| is_same(other, output));
         let mut list: Vec<usize> =
             self.outputs.iter().filter(|output| test(output)).filter_map(first).collect();
@@ -125,7 +127,8 @@ impl FieldTarget {
         match (kind, species) {
             (OutputKind::Covariance | OutputKind::Mixing, [a]) => Some(Self::Pair(*a, *a)),
             (OutputKind::Covariance | OutputKind::Mixing, [a, b]) => Some(Self::Pair(*a, *b)),
-            (OutputKind::Profile | OutputKind::Map | OutputKind::Total, [a]) => Some(Self::Species(*a)),
+            (OutputKind::Profile | OutputKind::Map, [a]) => Some(Self::Species(*a)),
+            (kind, [a]) if kind.is_course() => Some(Self::Species(*a)),
             _ => None,
         }
     }

@@ -28,14 +28,22 @@ impl Target {
             Target::Concentration(_) => &[OutputKind::Profile, OutputKind::Map],
             Target::Covariance(..) => &[OutputKind::Covariance],
             Target::Mixing(..) => &[OutputKind::Mixing],
-            Target::Total(_) => &[OutputKind::Total],
+            Target::Course(kind, _) => match kind {
+                OutputKind::Breakthrough => &[OutputKind::Breakthrough],
+                OutputKind::FirstPassage => &[OutputKind::FirstPassage],
+                OutputKind::Moments => &[OutputKind::Moments],
+                OutputKind::Dilution => &[OutputKind::Dilution],
+                _ => &[OutputKind::Total],
+            },
         }
     }
 
     pub(super) fn is_in(self, output: &Output) -> bool {
         self.outputs().contains(&output.kind)
             && match self {
-                Target::Concentration(species) | Target::Total(species) => output.species.contains(&species),
+                Target::Concentration(species) | Target::Course(_, species) => {
+                    output.species.contains(&species)
+                }
                 Target::Covariance(a, b) | Target::Mixing(a, b) => {
                     output.pairs.contains(&(a, b)) || output.pairs.contains(&(b, a))
                 }
@@ -44,9 +52,10 @@ impl Target {
 
     pub(super) fn species(self) -> usize {
         match self {
-            Target::Concentration(a) | Target::Total(a) | Target::Covariance(a, _) | Target::Mixing(a, _) => {
-                a
-            }
+            Target::Concentration(a)
+            | Target::Course(_, a)
+            | Target::Covariance(a, _)
+            | Target::Mixing(a, _) => a,
         }
     }
 }
@@ -108,7 +117,7 @@ fn target(checker: &mut Checker<'_>, written: &tree::Target, span: Span) -> Opti
         None => None,
         Some(name) => {
             let words: Vec<(&str, OutputKind)> =
-                OUTPUTS.iter().copied().filter(|(word, _)| *word != "particles").collect();
+                OUTPUTS.iter().copied().filter(|(_, kind)| kind.is_binned() || kind.is_course()).collect();
             Some(checker.word(name, "an output that a reference can predict", &words)?)
         }
     };
@@ -121,7 +130,7 @@ fn target(checker: &mut Checker<'_>, written: &tree::Target, span: Span) -> Opti
         (Some(OutputKind::Covariance), [a, b]) => Some(Target::Covariance(*a, *b)),
         (Some(OutputKind::Mixing), [a]) => Some(Target::Mixing(*a, *a)),
         (Some(OutputKind::Mixing), [a, b]) => Some(Target::Mixing(*a, *b)),
-        (Some(OutputKind::Total), [a]) => Some(Target::Total(*a)),
+        (Some(kind), [a]) if kind.is_course() => Some(Target::Course(kind, *a)),
         _ => None,
     };
     if target.is_none() {
@@ -331,7 +340,7 @@ fn check_prediction(
         Predicts::Concentration => (matches!(target, Target::Concentration(_)), "a concentration"),
         Predicts::Covariance => (matches!(target, Target::Covariance(..)), "a covariance"),
         Predicts::Gamma => (matches!(target, Target::Mixing(..)), "a mixing ratio γ"),
-        Predicts::Total => (matches!(target, Target::Total(_)), "a total"),
+        Predicts::Total => (matches!(target, Target::Course(OutputKind::Total, _)), "a total"),
     };
     if fits {
         return Some(());

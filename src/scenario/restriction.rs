@@ -5,7 +5,7 @@
 use super::check::Checker;
 use super::measure::Scalar;
 use super::places::{Results, has_times};
-use super::{Domain, Output, OutputKind};
+use super::{Domain, Output};
 use crate::diagnostic::codes::{M005, M015};
 use crate::diagnostic::{Diagnostic, precise};
 use crate::source::Span;
@@ -88,7 +88,7 @@ fn check_range(
             .found(format!("`over {name} = …`"))
             .expected(expected)
     };
-    if matches!(output.kind, OutputKind::Total | OutputKind::Mixing | OutputKind::Particles) {
+    if !output.kind.is_binned() {
         let message =
             no_such_bins(format!("`{word}` has no bins that a range could choose"), "no `over`".into());
         checker.report(message.help("a `profile` or a `map` has bins"));

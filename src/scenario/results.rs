@@ -243,7 +243,7 @@ fn norm_dimension(norm: Norm, field: Dimension, on: OutputKind, n_axes: usize) -
     let n_integrated = match on {
         OutputKind::Profile | OutputKind::Covariance => 1,
         OutputKind::Map => n_axes as i32,
-        OutputKind::Total | OutputKind::Mixing | OutputKind::Particles => 0,
+        _ => 0,
     };
     let power = match norm {
         Norm::L1 | Norm::Integral => (n_integrated, 1),

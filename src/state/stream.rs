@@ -19,6 +19,8 @@ pub enum Purpose {
     Track,
     /// What single particles meet on such a walk.
     Wall,
+    /// The same on the way to a time between two steps.
+    BridgeWall,
     /// New particles.
     Release,
     /// Random conductivity.
@@ -40,6 +42,7 @@ impl Stream {
             Purpose::Bridge => "bridge",
             Purpose::Track => "track",
             Purpose::Wall => "wall",
+            Purpose::BridgeWall => "bridge wall",
             Purpose::Release => "release",
             Purpose::Conductivity => "conductivity",
         };

@@ -221,7 +221,7 @@ fn concentrations(snapshots: &[Snapshot]) -> impl Iterator<Item = f64> {
                 columns.concat()
             }
             Values::Total { amount } => amount.clone(),
-            Values::Covariance { .. } | Values::Mixing(_) => Vec::new(),
+            Values::Covariance { .. } | Values::Mixing(_) | Values::Rows(_) => Vec::new(),
         }
     };
     snapshots.iter().flat_map(of).filter(|value| !value.is_nan())

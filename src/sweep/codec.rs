@@ -3,7 +3,7 @@
 //! Owns the encoding of frames: little-endian, lengths before contents, no padding. May use the shapes
 //! that it encodes. It deliberately trusts no length: what does not fit is no value.
 
-use crate::engine::snapshot::{MixingState, Snapshot, Values};
+use crate::engine::snapshot::{MixingState, Row, Snapshot, Values};
 use crate::table::{ErrorRow, Norms, PointRow, Status, Swept, SweptValue, Value};
 
 /// A value with an encoding; `take` gives nothing for bytes that are not whole.
@@ -49,6 +49,7 @@ structs! {
     Value { name, unit, value }
     Norms { l1, l2, linf, rmse }
     MixingState { m, m_mean, m_cov, gamma }
+    Row { place, numbers }
     ErrorRow {
         point, replicate, t, reference, output, kind, species_a, species_b, n, n_empty, norms, relative, noise,
         unit,
@@ -211,6 +212,10 @@ impl Code for Values {
                 positions.put(out);
                 concentrations.put(out);
             }
+            Self::Rows(rows) => {
+                5_u8.put(out);
+                rows.put(out);
+            }
         }
     }
 
@@ -225,6 +230,7 @@ impl Code for Values {
             2 => Self::Total { amount: Code::take(input)? },
             3 => Self::Mixing(Code::take(input)?),
             4 => Self::Particles { positions: Code::take(input)?, concentrations: Code::take(input)? },
+            5 => Self::Rows(Code::take(input)?),
             _ => return None,
         })
     }
@@ -246,6 +252,7 @@ mod tests {
             Values::Total { amount: vec![] },
             Values::Mixing(vec![state, state]),
             Values::Particles { positions: vec![vec![1.0]], concentrations: vec![vec![2.0], vec![3.0]] },
+            Values::Rows(vec![vec![Row { place: 2, numbers: vec![1.5, -3.0] }], vec![]]),
         ];
         let snapshot = |(output_idx, values)| Snapshot { output_idx, t: 0.25, values };
         all.into_iter().enumerate().map(snapshot).collect()

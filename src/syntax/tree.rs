@@ -354,7 +354,7 @@ pub struct Run {
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Output {
-    /// A catalogue name: `profile`, `covariance`, `map`, `total`, `mixing`, `particles`.
+    /// A catalogue name: `profile`, `total`, `breakthrough`, …
     pub kind: Name,
     pub species: Vec<Name>,
     pub times: Option<Times>,
@@ -362,8 +362,30 @@ pub struct Output {
     pub along: Option<Name>,
     /// `on 200 x 80`
     pub grid: Vec<Expr>,
+    /// `at x = 10 m`, `at right`, `in box(…)`
+    pub place: Option<Place>,
+    /// `resident`, `flux_weighted`
+    pub averaging: Option<Name>,
     /// The text after `in`: a unit, as written.
     pub unit: Option<Spanned<String>>,
+}
+
+/// Where an output is taken.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Place {
+    Plane(Name, Expr),
+    Side(Name),
+    Box(Span, Vec<Range>),
+}
+
+impl Place {
+    pub fn span(&self) -> Span {
+        match self {
+            Self::Plane(name, at) => name.span.to(at.span),
+            Self::Side(name) => name.span,
+            Self::Box(span, _) => *span,
+        }
+    }
 }
 
 #[derive(Debug, Clone, PartialEq)]

@@ -81,7 +81,7 @@ pub fn clause_words(keyword: &str) -> &'static [&'static str] {
         "source" => &["at", "in", "along", "during"],
         "mixing" => &["zones", "fraction", "rate"],
         "run" => &["to", "step"],
-        "output" => &["at", "every", "along", "on", "in"],
+        "output" => &["at", "every", "along", "on", "in", "resident", "flux_weighted"],
         "reference" => &["for"],
         "measure" => &["over", "at"],
         "use" => &["as"],

@@ -7,9 +7,10 @@ use super::bins::Grid;
 use super::failure::TableError;
 use super::schema::{self, Kind};
 use super::sheet::{ROW_GROUP, Sheet};
-use super::unit::{ValueUnit, value_unit};
-use crate::engine::snapshot::{MixingState, Snapshot, Values, counts};
-use crate::plan::{Output, Plan, Quantity};
+use super::unit::{ValueUnit, si_text, value_dimension, value_unit};
+use crate::engine::snapshot::{MixingState, Row, Snapshot, Values, counts};
+use crate::plan::station::Rule;
+use crate::plan::{Output, OutputKind, Plan, Quantity};
 use arrow_array::types::UInt16Type;
 use arrow_array::{
     ArrayRef, DictionaryArray, Float64Array, RecordBatch, StringArray, UInt16Array, UInt32Array, UInt64Array,
@@ -28,6 +29,10 @@ pub struct Layout {
     unit_keys: Vec<Vec<(u16, f64)>>,
     /// The unit of the whole table, if there is only one.
     pub row_unit: Option<String>,
+    /// Units of amounts, and per species its place there.
+    amounts: (ArrayRef, Vec<u16>),
+    /// Words of places, and where those of each output begin.
+    places: (ArrayRef, Vec<u16>),
 }
 
 impl Layout {
@@ -55,8 +60,38 @@ impl Layout {
             units: Arc::new(StringArray::from_iter_values(&texts)),
             unit_keys,
             row_unit,
+            amounts: amounts(plan, n_axes),
+            places: places(kind, plan),
         }
     }
+}
+
+/// Units of the amounts of all species.
+fn amounts(plan: &Plan, n_axes: usize) -> (ArrayRef, Vec<u16>) {
+    let mut texts: Vec<String> = Vec::new();
+    let mut keys = Vec::new();
+    for idx in 0..plan.species.len() {
+        let text = si_text(value_dimension(plan, OutputKind::Total, Quantity::Species(idx), n_axes));
+        let place = texts.iter().position(|other| *other == text).unwrap_or_else(|| {
+            texts.push(text);
+            texts.len() - 1
+        });
+        keys.push(place as u16);
+    }
+    (Arc::new(StringArray::from_iter_values(&texts)), keys)
+}
+
+/// Words of the places of all outputs of a kind.
+fn places(kind: Kind, plan: &Plan) -> (ArrayRef, Vec<u16>) {
+    let mut words: Vec<String> = Vec::new();
+    let mut firsts = Vec::new();
+    for output in &plan.outputs {
+        firsts.push(words.len() as u16);
+        if Kind::from(output.kind) == kind {
+            words.extend(plan.places(output));
+        }
+    }
+    (Arc::new(StringArray::from_iter_values(&words)), firsts)
 }
 
 /// Point and replicate that rows belong to.
@@ -106,6 +141,7 @@ impl Block<'_> {
             Values::Covariance { n_particles, .. } => n_particles.len(),
             Values::Total { .. } | Values::Mixing(_) => 1,
             Values::Particles { concentrations, .. } => concentrations[self.quantity_idx].len(),
+            Values::Rows(all) => all[self.quantity_idx].len(),
         }
     }
 
@@ -143,12 +179,48 @@ impl Block<'_> {
                 columns.extend(self.names(rows.len()));
                 columns.push(self.values(&concentrations[q], rows.clone(), |_| true));
             }
+            Values::Rows(all) => columns.extend(self.rows(&all[q][rows.clone()])),
         }
         columns.extend(self.tail(rows.len()));
         RecordBatch::try_new(self.layout.schema.clone(), columns).map_err(|reason| TableError::Format {
             file: self.layout.kind.name().into(),
             reason: reason.to_string(),
         })
+    }
+
+    /// Place, species, numbers and the unit of amounts, as in `schema::row_columns`.
+    fn rows(&self, rows: &[Row]) -> Vec<ArrayRef> {
+        let (kind, output_idx) = (self.plan.outputs[self.snapshot.output_idx].kind, self.snapshot.output_idx);
+        let mut columns: Vec<ArrayRef> = Vec::new();
+        if kind.has_places() {
+            let (words, firsts) = &self.layout.places;
+            let keys = UInt16Array::from_iter_values(rows.iter().map(|row| firsts[output_idx] + row.place));
+            columns.push(Arc::new(DictionaryArray::<UInt16Type>::new(keys, words.clone())));
+        }
+        if let Some(station) = &self.plan.outputs[output_idx].station {
+            let position = self.plan.position(station);
+            columns.extend(
+                position.map(|at| -> ArrayRef { Arc::new(Float64Array::from(vec![at; rows.len()])) }),
+            );
+        }
+        columns.extend(self.names(rows.len()));
+        let (_, factor) = self.unit();
+        for (idx, number) in kind.numbers().iter().enumerate() {
+            let values = rows.iter().map(|row| row.numbers[idx]);
+            let factor = if number.rule == Rule::Value { factor } else { 1.0 };
+            columns.push(match number.rule {
+                Rule::Count => Arc::new(UInt64Array::from_iter_values(values.map(|value| value as u64))),
+                _ => Arc::new(
+                    values.map(|value| value.is_finite().then_some(value / factor)).collect::<Float64Array>(),
+                ),
+            });
+        }
+        if schema::has_amounts(kind) {
+            let (units, keys) = &self.layout.amounts;
+            let (Quantity::Species(species) | Quantity::Pair(species, _)) = self.quantity;
+            columns.push(repeated(units, keys[species], rows.len()));
+        }
+        columns
     }
 
     fn head(&self, n: usize) -> Vec<ArrayRef> {
@@ -262,6 +334,15 @@ fn check_shape(plan: &Plan, output: &Output, snapshot: &Snapshot) -> Result<(), 
             let n = concentrations.first().map_or(0, Vec::len);
             all("particles", n, concentrations)?;
             all("particles", n, positions)
+        }
+        Values::Rows(rows) => {
+            is("quantities", n_quantities, rows.len())?;
+            let n_numbers = output.kind.numbers().len();
+            let n_places = plan.places(output).len().max(1);
+            rows.iter().flatten().try_for_each(|row| {
+                is("numbers", n_numbers, row.numbers.len())?;
+                is("places", n_places, n_places.max(usize::from(row.place) + 1))
+            })
         }
     }
 }

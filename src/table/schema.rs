@@ -4,6 +4,7 @@
 
 use super::unit::si_text;
 use crate::plan::OutputKind;
+use crate::plan::station::{Rule, number_dimension};
 use crate::units::Dimension;
 use arrow_schema::{DataType, Field, Schema};
 use std::collections::HashMap;
@@ -18,18 +19,28 @@ pub enum Kind {
     Total,
     Mixing,
     Particles,
+    Breakthrough,
+    FirstPassage,
+    Moments,
+    Dilution,
+    Budget,
     Errors,
     ErrorBars,
 }
 
 impl Kind {
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 13] = [
         Self::Profile,
         Self::Map,
         Self::Covariance,
         Self::Total,
         Self::Mixing,
         Self::Particles,
+        Self::Breakthrough,
+        Self::FirstPassage,
+        Self::Moments,
+        Self::Dilution,
+        Self::Budget,
         Self::Errors,
         Self::ErrorBars,
     ];
@@ -43,6 +54,11 @@ impl Kind {
             Self::Total => "total",
             Self::Mixing => "mixing",
             Self::Particles => "particles",
+            Self::Breakthrough => "breakthrough",
+            Self::FirstPassage => "first_passage",
+            Self::Moments => "moments",
+            Self::Dilution => "dilution",
+            Self::Budget => "budget",
             Self::Errors => "errors",
             Self::ErrorBars => "error_bars",
         }
@@ -58,6 +74,11 @@ impl From<OutputKind> for Kind {
             OutputKind::Total => Self::Total,
             OutputKind::Mixing => Self::Mixing,
             OutputKind::Particles => Self::Particles,
+            OutputKind::Breakthrough => Self::Breakthrough,
+            OutputKind::FirstPassage => Self::FirstPassage,
+            OutputKind::Moments => Self::Moments,
+            OutputKind::Dilution => Self::Dilution,
+            OutputKind::Budget => Self::Budget,
         }
     }
 }
@@ -85,6 +106,8 @@ pub struct Column {
 
 /// What field metadata says where the unit differs between rows.
 pub const BY_ROW: &str = "see column unit";
+/// The same for amounts.
+const BY_AMOUNT: &str = "see column amount_unit";
 
 impl Column {
     pub fn new(name: &str, shape: DataType, measured: Measured, doc: &str) -> Self {
@@ -159,12 +182,55 @@ pub fn columns(kind: Kind) -> Vec<Column> {
             columns.push(species());
             columns.push(concentration("concentration of the particle"));
         }
+        Kind::Breakthrough => columns.extend(row_columns(OutputKind::Breakthrough)),
+        Kind::FirstPassage => columns.extend(row_columns(OutputKind::FirstPassage)),
+        Kind::Moments => columns.extend(row_columns(OutputKind::Moments)),
+        Kind::Dilution => columns.extend(row_columns(OutputKind::Dilution)),
+        Kind::Budget => columns.extend(row_columns(OutputKind::Budget)),
         Kind::Errors => return error_columns(),
         Kind::ErrorBars => return error_bar_columns(),
     }
     columns.push(plain("unit", word(), "unit of the values of this row"));
     columns.push(plain("output", DataType::UInt16, "number of the output in the plan, from 0"));
     columns
+}
+
+/// Columns of an output in rows: where, of what, its numbers, the unit of amounts.
+fn row_columns(kind: OutputKind) -> Vec<Column> {
+    let mut columns = Vec::new();
+    if kind.has_station() {
+        columns.push(plain("place", word(), "plane, box, or the name of a side"));
+        columns.extend(["x", "y", "z"].map(|name| {
+            let doc = "where the plane or the side is, or the centre of the box; null along other axes";
+            Column::new(name, DataType::Float64, Measured::Fixed(Dimension::LENGTH), doc).or_null()
+        }));
+    } else if kind.has_places() {
+        let doc =
+            "`initial`, the name of a source or a side; `inside` is what is there, `defect` what is missing";
+        columns.push(plain("place", word(), doc));
+    }
+    columns.push(species());
+    columns.extend(kind.numbers().iter().map(|number| match number.rule {
+        Rule::Value => row_value(number.name, number.doc),
+        Rule::Count => plain(number.name, DataType::UInt64, number.doc),
+        rule => {
+            let measured = match rule {
+                Rule::Amount => Measured::Named(BY_AMOUNT.to_owned()),
+                Rule::Rate => Measured::Named(format!("{BY_AMOUNT}, per s")),
+                rule => Measured::Fixed(number_dimension(rule, Dimension::NONE, Dimension::NONE)),
+            };
+            Column::new(number.name, DataType::Float64, measured, number.doc).or_null()
+        }
+    }));
+    if has_amounts(kind) {
+        columns.push(plain("amount_unit", word(), "SI unit of amounts in this row; rates are that per s"));
+    }
+    columns
+}
+
+/// Whether rows have amounts or rates beside values in the unit of the output.
+pub fn has_amounts(kind: OutputKind) -> bool {
+    kind.numbers().iter().any(|number| matches!(number.rule, Rule::Amount | Rule::Rate))
 }
 
 fn error_columns() -> Vec<Column> {

@@ -62,9 +62,13 @@ pub fn value_dimension(plan: &Plan, kind: OutputKind, quantity: Quantity, n_axes
         OutputKind::Profile | OutputKind::Map | OutputKind::Particles | OutputKind::Covariance => {
             concentration
         }
-        OutputKind::Total | OutputKind::Mixing => {
-            product(concentration, Dimension::new(n_axes as i16, 0, 0, 0))
-        }
+        OutputKind::Breakthrough => concentration,
+        OutputKind::Total
+        | OutputKind::Mixing
+        | OutputKind::FirstPassage
+        | OutputKind::Moments
+        | OutputKind::Budget => product(concentration, Dimension::new(n_axes as i16, 0, 0, 0)),
+        OutputKind::Dilution => Dimension::new(n_axes as i16, 0, 0, 0),
     }
 }
 
@@ -83,7 +87,7 @@ pub fn integrated(plan: &Plan, kind: OutputKind, field: Dimension, root: i16) ->
     let n_axes = match kind {
         OutputKind::Profile | OutputKind::Covariance => 1,
         OutputKind::Map => plan.axes.len() as i16,
-        OutputKind::Total | OutputKind::Mixing | OutputKind::Particles => 0,
+        _ => 0,
     };
     product(field, Dimension([n_axes * SCALE / root, 0, 0, 0, 0, 0, 0]))
 }

@@ -20,7 +20,7 @@ fn species(name: &str, is_molar: bool) -> Species {
 }
 
 fn output(kind: OutputKind, quantities: Vec<Quantity>, bins: Vec<usize>, times: &[f64]) -> Output {
-    Output { kind, quantities, bins, times: times.to_vec(), unit: None }
+    Output { kind, quantities, bins, times: times.to_vec(), unit: None, station: None }
 }
 
 /// Two axes, two species in mol and one in kg.

@@ -41,7 +41,20 @@ TABLES = {
     + [(name, REAL, ROW) for name in NORMS] + [("relative_" + name, REAL, "1") for name in NORMS]
     + [("noise", REAL, ROW), ("unit", WORD, "")],
 }
-TABLES["map"] = TABLES["profile"]
+AMOUNT, RATE = "see column amount_unit", "see column amount_unit, per s"
+STATION = [("place", WORD, "")] + PLACE + [("species", WORD, "")]
+MOMENTS = [("mean_" + axis, REAL, "m") for axis in "xyz"] + [(pair, REAL, "m^2") for pair in ("xx", "yy", "zz", "xy", "xz", "yz")]
+TABLES |= {
+    "map": TABLES["profile"],
+    "breakthrough": HEAD + STATION + [("concentration", REAL, ROW), ("rate", REAL, RATE), ("cumulative", REAL, AMOUNT),
+                                      ("n_particles", "uint64", ""), ("amount_unit", WORD, "")] + TAIL,
+    "first_passage": HEAD + STATION + [("cumulative", REAL, ROW), ("rate", REAL, RATE), ("n_particles", "uint64", ""),
+                                       ("amount_unit", WORD, "")] + TAIL,
+    "moments": HEAD + [("species", WORD, ""), ("amount", REAL, ROW)] + MOMENTS + TAIL,
+    "dilution": HEAD + [("species", WORD, ""), ("index", REAL, ROW), ("entropy", REAL, "1"), ("reactor_ratio", REAL, "1")] + TAIL,
+    "budget": HEAD + [("place", WORD, ""), ("species", WORD, ""), ("amount", REAL, ROW), ("entered", REAL, ROW),
+                      ("left", REAL, ROW)] + TAIL,
+}
 
 # Columns of points.parquet that every run has; scenes add more.
 POINTS = {

@@ -47,7 +47,7 @@ pub fn dual_rate(eta: f64, chi: f64) -> Option<Mixing> {
 }
 
 pub fn output(kind: OutputKind, quantities: Vec<Quantity>, bins: Vec<usize>, times: Vec<f64>) -> Output {
-    Output { kind, quantities, bins, times, unit: None }
+    Output { kind, quantities, bins, times, unit: None, station: None }
 }
 
 pub fn species(name: &str, constant: f64, terms: Vec<(usize, f64)>) -> Species {

@@ -6,10 +6,15 @@
 mod book;
 mod entry;
 mod flock;
+mod gate;
+mod media;
 mod observe;
 mod place;
 mod release;
 mod run;
+mod shape;
+mod water;
 mod world;
 
-pub use run::run;
+pub use media::run;
+pub use shape::{PRODUCTS, dilution, product};

@@ -6,11 +6,13 @@
 use super::super::error::RunError;
 use super::super::parallel;
 use super::super::program::unsound;
-use super::super::snapshot::{Snapshot, Values};
+use super::super::snapshot::{Row, Snapshot, Values};
+use super::book::Book;
 use super::flock::{self, Flock};
+use super::gate;
 use super::world::Site;
 use crate::maths::exact::{MOST_TERMS, Quanta, Sum};
-use crate::plan::{Output, OutputKind, Quantity};
+use crate::plan::{Output, OutputKind, Station};
 use crate::state::grid::Grid;
 use crate::state::particles::CHUNK;
 
@@ -20,6 +22,7 @@ pub struct Scene<'a, const D: usize> {
     pub flocks: &'a [Flock<D>],
     pub units: &'a [f64],
     pub quanta: Quanta,
+    pub book: &'a Book,
 }
 
 impl<const D: usize> Scene<'_, D> {
@@ -29,6 +32,18 @@ impl<const D: usize> Scene<'_, D> {
             OutputKind::Profile | OutputKind::Map => self.binned(output)?,
             OutputKind::Total => Values::Total { amount: self.totals(output) },
             OutputKind::Particles => self.particles(output),
+            OutputKind::Moments => self.rows(output, |population| vec![self.moments(population)]),
+            OutputKind::Budget => self.rows(output, |population| self.budget(population)),
+            OutputKind::Dilution => {
+                let grid = self.grid(output).ok_or_else(|| unsound("bins that do not make a grid"))?;
+                self.rows(output, |population| vec![self.dilution(population, &grid)])
+            }
+            OutputKind::Breakthrough | OutputKind::FirstPassage => match &output.station {
+                Some(Station::Box { low, high }) if output.kind == OutputKind::Breakthrough => {
+                    self.rows(output, |population| vec![self.in_box(population, low, high)])
+                }
+                _ => return Err(unsound("a place that nobody counts at")),
+            },
             OutputKind::Covariance | OutputKind::Mixing => {
                 return Err(unsound("an output of fluid in a run of masses"));
             }
@@ -38,18 +53,16 @@ impl<const D: usize> Scene<'_, D> {
 
     /// The populations of an output's species, in its order; nothing is carried by some.
     fn populations(&self, output: &Output) -> Vec<Option<usize>> {
-        let of = |quantity: &Quantity| {
-            let (Quantity::Species(species) | Quantity::Pair(species, _)) = *quantity;
-            self.site.transport.populations.iter().position(|population| population.species == species)
-        };
-        output.quantities.iter().map(of).collect()
+        gate::populations(self.site.plan, output)
+    }
+
+    fn rows(&self, output: &Output, rows: impl Fn(Option<usize>) -> Vec<Row>) -> Values {
+        Values::Rows(self.populations(output).into_iter().map(rows).collect())
     }
 
     fn binned(&self, output: &Output) -> Result<Values, RunError> {
-        let bins: [usize; D] =
-            output.bins.clone().try_into().map_err(|_| unsound("an output whose bins do not fit"))?;
-        let grid = Grid::new(self.site.low, self.site.high, bins, [true; D])
-            .ok_or_else(|| unsound("an output whose bins do not make a grid"))?;
+        let grid = self.grid(output).ok_or_else(|| unsound("an output whose bins do not make a grid"))?;
+        let bins = grid.bins();
         let centres: Vec<[f64; D]> = (0..grid.n_bins()).map(|bin| grid.centre(bin)).collect();
         let porosity = self.site.evaluate(&self.site.transport.porosity, &centres, 0.0);
         let volume: f64 =
@@ -71,7 +84,7 @@ impl<const D: usize> Scene<'_, D> {
     }
 
     /// Mass, squared mass and number of a population per slot of a grid.
-    fn sums(&self, population: usize, grid: &Grid<D>) -> Vec<Cell> {
+    pub(super) fn sums(&self, population: usize, grid: &Grid<D>) -> Vec<Cell> {
         let flocks: Vec<&Flock<D>> =
             self.flocks.iter().filter(|flock| flock.population == population).collect();
         let n_groups = flocks.len().clamp(1, 16);
@@ -115,13 +128,11 @@ impl<const D: usize> Scene<'_, D> {
 
     /// Mass of a population that is there.
     pub fn inside(&self, population: usize) -> f64 {
-        let mut sum = Sum::default();
+        let mut counts = vec![0_u64; self.units.len()];
         for flock in self.flocks.iter().filter(|flock| flock.population == population) {
-            for &id in &flock.ids {
-                self.quanta.add(&mut sum, self.units[flock::origin(id)]);
-            }
+            flock.ids.iter().for_each(|&id| counts[flock::origin(id)] += 1);
         }
-        sum.value()
+        self.book.mass(&counts)
     }
 
     /// Positions in the order of numbers; the mass stands in the column of the particle's species.
@@ -151,8 +162,8 @@ impl<const D: usize> Scene<'_, D> {
 
 /// Sums of a bin.
 #[derive(Debug, Clone, Copy, Default)]
-struct Cell {
-    mass: Sum,
+pub(super) struct Cell {
+    pub mass: Sum,
     square: Sum,
     n: u64,
 }

@@ -20,7 +20,8 @@ pub struct Birth<const D: usize> {
 /// Particles of equal mass from one origin.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Release<const D: usize> {
-    pub name: String,
+    /// What it comes in by: 0 is the start, then sources, then sides.
+    pub door: usize,
     pub origin: usize,
     pub population: usize,
     /// Mass of each, mol or kg.
@@ -90,12 +91,19 @@ impl<const D: usize> Release<D> {
                     return;
                 }
                 let offset = stream.uniforms_of(flock::id(self.origin, 0), 1)[0];
-                let until = |step: u64| (per_step * step as f64 + offset) as u64;
-                for count in until(window.step)..until(window.step + 1) {
+                let before = per_step * window.step as f64 + offset;
+                // A step of another length, as the last one may be, has its own share and depths.
+                let is_whole = (window.dt / entry.time - 1.0).abs() < 1e-9;
+                let own = if is_whole { *entry } else { Entry { time: window.dt, ..*entry } };
+                let after = match is_whole {
+                    true => per_step * (window.step + 1) as f64 + offset,
+                    false => before + per_step * own.total() / entry.total(),
+                };
+                for count in before as u64..after as u64 {
                     let id = flock::id(self.origin, count);
                     let uniforms = stream.uniforms_of(id, 0);
                     let mut position = self.place.at(uniforms[5], &uniforms, count);
-                    position[*axis] += sign * entry.depth(uniforms[6]);
+                    position[*axis] += sign * own.depth(uniforms[6]);
                     // They are where they are at the end of the step.
                     births.push(Birth { id, population: self.population, position, entered: 1.0 });
                 }

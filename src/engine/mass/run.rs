@@ -7,144 +7,30 @@ use super::super::clock::Clock;
 use super::super::control::{Control, Settings};
 use super::super::error::RunError;
 use super::super::parallel::{self, Pool};
-use super::super::program::unsound;
 use super::super::schedule::{Due, schedule, step_length};
 use super::super::snapshot::{Outcome, Snapshot};
-use super::super::track::cells::{CellMedium, Dispersivity};
-use super::super::track::formula::{Formula, Spreading};
 use super::super::track::lanes::{LANES, Lane};
 use super::super::track::medium::{Carrier, Medium};
-use super::super::track::tracker::{Bench, Steps, TooManySubSteps, Tracker};
-use super::super::track::uniform::Uniform;
+use super::super::track::monitors::Plane;
+use super::super::track::noise::Draws;
+use super::super::track::tracker::{Bench, EARLIEST, Steps, TooManySubSteps, Tracker};
+use super::super::track::walls::Ends;
 use super::book::{Book, Event, Log, What};
 use super::flock::{self, Flock};
+use super::gate::Gates;
 use super::observe::Scene;
 use super::release::{Birth, Kind, Release, Window};
 use super::world::Site;
 use crate::chemistry::Work;
-use crate::flow::build;
 use crate::maths::exact::{MOST_TERMS, Quanta};
 use crate::maths::wide::Width;
-use crate::plan::Plan;
-use crate::plan::tape::{Operation, Tape};
-use crate::plan::transport::{Dispersion, Flow};
+use crate::plan::{Normals, Station};
 use crate::state::stream::{Purpose, Stream};
-use std::sync::Arc;
 
 /// Steps that a block is taken through before the next one.
 const TILE: u64 = 8;
 
-type Sink<'a> = &'a mut (dyn FnMut(Snapshot) -> Result<(), RunError> + Send);
-
-/// Runs a plan of masses; the medium is matched here, once.
-pub fn run<const D: usize>(
-    plan: &Plan,
-    settings: &Settings,
-    control: &dyn Control,
-    sink: Sink,
-) -> Result<Outcome, RunError> {
-    let flow = match &settings.flow {
-        Some(flow) => Some(flow.clone()),
-        None => build::of(plan)
-            .map_err(|error| RunError::Flow(error.to_string()))?
-            .map(|solution| Arc::new(solution.flow)),
-    };
-    let site = Site::<D>::new(plan, flow)?;
-    match (&site.transport.flow, &site.transport.dispersion) {
-        (Flow::Uniform(velocity), Dispersion::Constant(_) | Dispersion::Velocity { .. })
-            if is_constant(&site.transport.porosity) =>
-        {
-            let velocity: [f64; D] =
-                velocity.clone().try_into().map_err(|_| unsound("a velocity that does not fit the axes"))?;
-            go(&site, uniform(plan, velocity, &site.transport.dispersion)?, settings, control, sink)
-        }
-        (Flow::Uniform(_) | Flow::Expression(_), _) => go(&site, formula(&site)?, settings, control, sink),
-        (
-            Flow::Darcy(_) | Flow::File(_),
-            Dispersion::Velocity { longitudinal, transverse, molecular, .. },
-        ) => {
-            let flow = site.flow.as_ref().ok_or_else(|| unsound("a flow that nobody solved"))?;
-            let axes = std::array::from_fn(|axis| plan.axes[axis].index);
-            let dispersivity =
-                Dispersivity { longitudinal: *longitudinal, transverse: *transverse, molecular: *molecular };
-            let medium = CellMedium::<D>::new(flow, axes, dispersivity)
-                .ok_or_else(|| unsound("cells that are not equal, or porosity that varies"))?;
-            go(&site, medium, settings, control, sink)
-        }
-        _ => Err(unsound("flow and dispersion that do not go together yet")),
-    }
-}
-
-fn is_constant(tape: &Tape) -> bool {
-    matches!(tape.operations[..], [Operation::Constant(_)])
-}
-
-/// A medium of expressions.
-fn formula<const D: usize>(site: &Site<D>) -> Result<Formula<D>, RunError> {
-    let constant = |value: f64| Tape { operations: vec![Operation::Constant(value)] };
-    let velocity: Vec<Tape> = match &site.transport.flow {
-        Flow::Uniform(velocity) => velocity.iter().map(|&v| constant(v)).collect(),
-        Flow::Expression(tapes) => tapes.clone(),
-        Flow::Darcy(_) | Flow::File(_) => return Err(unsound("a flow without expressions")),
-    };
-    let spreading = match &site.transport.dispersion {
-        Dispersion::Constant(triangle) => Spreading::Constant(triangle_of(triangle)?, 0.0),
-        Dispersion::Isotropic(tape) => Spreading::Isotropic(tape.clone()),
-        Dispersion::Velocity { longitudinal, transverse, molecular, .. } => Spreading::Velocity {
-            longitudinal: *longitudinal,
-            transverse: *transverse,
-            molecular: *molecular,
-        },
-    };
-    Ok(Formula {
-        axes: std::array::from_fn(|axis| site.plan.axes[axis].index),
-        velocity: velocity.try_into().map_err(|_| unsound("a velocity that does not fit the axes"))?,
-        spreading,
-        porosity: site.transport.porosity.clone(),
-        width: std::array::from_fn(|axis| site.high[axis] - site.low[axis]),
-    })
-}
-
-/// A lower triangle, row by row.
-fn triangle_of<const D: usize>(entries: &[f64]) -> Result<[[f64; D]; D], RunError> {
-    if entries.len() != D * (D + 1) / 2 {
-        return Err(unsound("a dispersion that does not fit the axes"));
-    }
-    let mut tensor = [[0.0; D]; D];
-    for (row, target) in tensor.iter_mut().enumerate() {
-        target[..=row].copy_from_slice(&entries[row * (row + 1) / 2..][..=row]);
-    }
-    Ok(tensor)
-}
-
-/// A uniform medium from constants, or from lengths along the velocity.
-fn uniform<const D: usize>(
-    plan: &Plan,
-    velocity: [f64; D],
-    dispersion: &Dispersion,
-) -> Result<Uniform<D>, RunError> {
-    let mut tensor = [[0.0; D]; D];
-    let mut own = 0.0;
-    match dispersion {
-        Dispersion::Constant(triangle) => tensor = triangle_of(triangle)?,
-        Dispersion::Velocity { longitudinal, transverse, molecular, .. } => {
-            let speed = velocity.iter().map(|v| v * v).sum::<f64>().sqrt();
-            own = *molecular;
-            for i in 0..D {
-                for j in 0..=i {
-                    let along = if speed > 0.0 { velocity[i] * velocity[j] / speed } else { 0.0 };
-                    tensor[i][j] = (longitudinal - transverse) * along;
-                    if i == j {
-                        tensor[i][j] += transverse * speed + molecular;
-                    }
-                }
-            }
-        }
-        Dispersion::Isotropic(_) => return Err(unsound("a dispersion that varies in a uniform medium")),
-    }
-    let width = std::array::from_fn(|axis| plan.axes[axis].high - plan.axes[axis].low);
-    Ok(Uniform { velocity, dispersion: tensor, molecular: own, width })
-}
+pub type Sink<'a> = &'a mut (dyn FnMut(Snapshot) -> Result<(), RunError> + Send);
 
 /// Everything that lives as long as the run.
 struct Run<'a, const D: usize, M: Medium<D>> {
@@ -156,6 +42,9 @@ struct Run<'a, const D: usize, M: Medium<D>> {
     stream: Stream,
     flocks: Vec<Flock<D>>,
     book: Book,
+    quanta: Quanta,
+    /// Outputs of what passes places.
+    gates: Gates,
     benches: Pool<Bench<D, M>>,
     displacements: u64,
 }
@@ -174,7 +63,8 @@ enum Trouble {
     Position { id: u64, step: u64 },
 }
 
-fn go<const D: usize, M: Medium<D>>(
+/// Runs in a medium.
+pub fn go<const D: usize, M: Medium<D>>(
     site: &Site<D>,
     medium: M,
     settings: &Settings,
@@ -182,19 +72,22 @@ fn go<const D: usize, M: Medium<D>>(
     sink: Sink,
 ) -> Result<Outcome, RunError> {
     let mut clock = Clock::start();
-    let dues = schedule(site.plan)?;
+    let mut dues = schedule(site.plan)?;
     let width = if settings.is_narrow { Width::baseline() } else { Width::widest() };
-    let mut run = Run::new(site, medium, width)?;
+    let mut run = Run::new(site, medium, width, &mut dues)?;
     let mut loop_clock = Clock::start();
     let mut dues = dues.iter().peekable();
     let n_steps = site.plan.time.n_steps;
     let mut step = 0;
     run.start()?;
     loop {
+        let mut snapshots = run.gates.ready(step);
         while let Some(due) = dues.next_if(|due| due.steps == step) {
-            for snapshot in run.observe(due)? {
-                loop_clock.away(|| clock.away(|| sink(snapshot)))?;
-            }
+            snapshots.extend(run.observe(due)?);
+        }
+        snapshots.sort_by(|a, b| a.t.total_cmp(&b.t).then(a.output_idx.cmp(&b.output_idx)));
+        for snapshot in snapshots {
+            loop_clock.away(|| clock.away(|| sink(snapshot)))?;
         }
         if control.is_cancelled() {
             return Err(RunError::Cancelled);
@@ -225,16 +118,27 @@ fn go<const D: usize, M: Medium<D>>(
 }
 
 impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
-    fn new(site: &'a Site<'a, D>, medium: M, width: Width) -> Result<Self, RunError> {
-        let tracker = site.tracker(medium, width)?;
+    fn new(site: &'a Site<'a, D>, medium: M, width: Width, dues: &mut Vec<Due>) -> Result<Self, RunError> {
+        let mut tracker = site.tracker(medium, width)?;
+        let mut planes: Vec<Plane> = Vec::new();
+        let period = |axis: usize| match tracker.ends[axis] {
+            Ends::Periodic { low, high } => Some(high - low),
+            Ends::Walls(_) => None,
+        };
+        let water = |station: &Station| site.water(&tracker.medium, station);
+        let gates = Gates::new(site.plan, dues, &mut planes, period, water);
+        tracker.planes = planes;
         let releases = site.releases(&tracker)?;
         let units: Vec<f64> = releases.iter().map(|release| release.unit).collect();
         let largest = units.iter().fold(0.0, |a: f64, &b| a.max(b));
-        // Particles that are refilled count again and again; sums are over what happened, too.
-        let quanta = Quanta::new(largest, MOST_TERMS);
+        let doors = releases.iter().map(|release| release.door).collect();
+        let n_doors = 1 + site.transport.sources.len() + 2 * D + site.transport.drains().len();
         Ok(Self {
             carriers: site.carriers(),
-            book: Book::new(quanta, site.transport.populations.len()),
+            book: Book::new(units.clone(), doors, n_doors, site.transport.populations.len()),
+            // Particles that are refilled count again and again; sums are over what happened, too.
+            quanta: Quanta::new(largest, MOST_TERMS),
+            gates,
             stream: Stream::new(site.plan.seed, Purpose::Release),
             flocks: Vec::new(),
             benches: Pool::new(),
@@ -247,7 +151,18 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
     }
 
     fn note(&mut self, events: &[Event]) {
-        events.iter().for_each(|event| self.book.note(event));
+        let n_sides = 2 * D + self.site.transport.drains().len();
+        for event in events {
+            self.book.note(event, n_sides);
+            if !self.gates.are_none() {
+                self.gates.note(event, self.side_of(event.id), self.quanta);
+            }
+        }
+    }
+
+    /// The side that a particle came in through.
+    fn side_of(&self, id: u64) -> Option<usize> {
+        self.releases[flock::origin(id)].door.checked_sub(1 + self.site.transport.sources.len())
     }
 
     /// What is there at the start.
@@ -269,12 +184,23 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
     fn book_births(&mut self, births: &[Birth<D>], t: f64, dt: f64) {
         for birth in births {
             let origin = flock::origin(birth.id);
-            self.book.note(&Event {
-                what: What::Entered { origin },
+            let event = |what: What| Event {
+                what,
                 population: birth.population,
+                id: birth.id,
                 mass: self.units[origin],
-                t: t + birth.entered * dt,
-            });
+                t: t + birth.entered.max(EARLIEST) * dt,
+            };
+            let mut events = vec![event(What::Entered { origin })];
+            if let Kind::Held { axis, sign, .. } = self.releases[origin].kind {
+                // It has come from the side to where it is: planes on that way were crossed.
+                for (plane, of) in self.tracker.planes.iter().enumerate().filter(|(_, of)| of.axis == axis) {
+                    if sign * (birth.position[axis] - of.at) > 0.0 {
+                        events.push(event(What::Crossed { plane, is_forward: sign > 0.0 }));
+                    }
+                }
+            }
+            self.note(&events);
         }
     }
 
@@ -300,7 +226,7 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
                     if inside(position) {
                         let what = What::Replaced { origin: release.origin };
                         let mass = self.units[flock::origin(id)];
-                        events.push(Event { what, population: flock.population, mass, t });
+                        events.push(Event { what, population: flock.population, id, mass, t });
                         continue;
                     }
                     flock.set(kept, id, position);
@@ -315,8 +241,11 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
     /// Takes everything through steps of equal length.
     fn tile(&mut self, first: u64, end: u64) -> Result<(), RunError> {
         let time = &self.site.plan.time;
-        let dt = step_length(time, first);
-        let t = first as f64 * time.step;
+        self.advance(Steps { first, end, t: first as f64 * time.step, dt: step_length(time, first) })
+    }
+
+    fn advance(&mut self, steps: Steps) -> Result<(), RunError> {
+        let Steps { first, end, t, dt } = steps;
         self.empty_boxes(t);
         let mut newborn: Vec<Vec<Birth<D>>> = Vec::new();
         for step in first..end {
@@ -330,7 +259,7 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
             self.book_births(&births, window.t, dt);
             newborn.push(births);
         }
-        self.move_flocks(Steps { first, end, t, dt })?;
+        self.move_flocks(steps)?;
         for (step, births) in (first..end).zip(newborn) {
             let t = t + (step - first) as f64 * dt;
             self.move_newborn(births, Steps { first: step, end, t, dt })?;
@@ -406,23 +335,60 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
         Ok(())
     }
 
-    fn observe(&self, due: &Due) -> Result<Vec<Snapshot>, RunError> {
-        let scene =
-            Scene { site: self.site, flocks: &self.flocks, units: &self.units, quanta: self.book.quanta };
+    fn scene(&self) -> Scene<'_, D> {
+        Scene {
+            site: self.site,
+            flocks: &self.flocks,
+            units: &self.units,
+            quanta: self.quanta,
+            book: &self.book,
+        }
+    }
+
+    /// The outputs of a time; between two steps those of a copy that goes a part of the next one.
+    ///
+    /// - Equation: `X(t + f Δt) = X(t) + A f Δt + √(2D f Δt) ξ`, sides and sources over `f Δt`, with draws that
+    ///   nothing else uses.
+    /// - Symbols: `f` part of the step.
+    /// - Range: as right in law as a step of that length.
+    /// - Source: the Markov property of the walk.
+    /// - Shape: everything is as it was when this returns.
+    fn observe(&mut self, due: &Due) -> Result<Vec<Snapshot>, RunError> {
+        if due.fraction == 0.0 {
+            return self.look(due);
+        }
+        let plan = self.site.plan;
+        let aside = Draws::aside(plan.seed, D, plan.walk.normals == Normals::Double);
+        let draws = std::mem::replace(&mut self.tracker.draws, aside);
+        let planes = std::mem::take(&mut self.tracker.planes);
+        let gates = std::mem::take(&mut self.gates);
+        let (flocks, book, displacements) = (self.flocks.clone(), self.book.clone(), self.displacements);
+        let steps = Steps {
+            first: due.steps,
+            end: due.steps + 1,
+            t: due.steps as f64 * plan.time.step,
+            dt: due.fraction * step_length(&plan.time, due.steps),
+        };
+        let found = self.advance(steps).and_then(|()| self.look(due));
+        (self.flocks, self.book, self.displacements) = (flocks, book, displacements);
+        (self.tracker.draws, self.tracker.planes, self.gates) = (draws, planes, gates);
+        found
+    }
+
+    fn look(&self, due: &Due) -> Result<Vec<Snapshot>, RunError> {
+        let scene = self.scene();
         due.outputs.iter().map(|&output_idx| scene.observe(output_idx, due.t)).collect()
     }
 
     /// Per population |inside + left − entered| / entered.
     fn defects(&self) -> Vec<f64> {
-        let scene =
-            Scene { site: self.site, flocks: &self.flocks, units: &self.units, quanta: self.book.quanta };
+        let scene = self.scene();
         let defect = |population: usize| {
-            let account = &self.book.accounts[population];
-            let (entered, left) = (account.entered.value(), account.left.value());
+            let (entered, left) = self.book.whole(population);
             let error = (scene.inside(population) + left - entered).abs();
             if entered > 0.0 { error / entered } else { error }
         };
-        (0..self.book.accounts.len()).map(defect).collect()
+        (0..self.carriers.len()).map(defect).collect()
     }
 }
 

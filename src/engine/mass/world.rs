@@ -5,6 +5,7 @@
 
 use super::super::error::RunError;
 use super::super::program::unsound;
+use super::super::track::drains::Drain;
 use super::super::track::interfaces::Interface;
 use super::super::track::medium::{Carrier, Criteria, Medium, spread_at};
 use super::super::track::noise::Draws;
@@ -77,6 +78,7 @@ impl<'a, const D: usize> Site<'a, D> {
             medium,
             ends: ends.try_into().map_err(|_| unsound("sides that do not fit the axes"))?,
             planes: Vec::new(),
+            drains: self.drains(),
             draws: Draws::new(self.plan.seed, D, is_double),
             interfaces: self
                 .transport
@@ -90,6 +92,34 @@ impl<'a, const D: usize> Site<'a, D> {
                 .map(|sub| Criteria { courant: sub.courant, dispersion: sub.dispersion }),
             width,
         })
+    }
+
+    /// The cells that wells take water from.
+    fn drains(&self) -> Vec<Drain<D>> {
+        let Some(flow) = &self.flow else { return Vec::new() };
+        let mut drains = Vec::new();
+        for (idx, well) in self.transport.drains().into_iter().enumerate() {
+            for &(cell, rate) in flow.sinks.iter().filter(|(_, rate)| *rate > 0.0) {
+                let [low, high] = self.cell(flow, cell);
+                let meets = |axis: usize| well.low[axis] < high[axis] && well.high[axis] >= low[axis];
+                if (0..D).all(meets) {
+                    let volume: f64 = (0..D).map(|axis| high[axis] - low[axis]).product();
+                    let water = flow.porosity[cell] * volume;
+                    drains.push(Drain { low, high, rate: rate / water, side: 2 * D + idx });
+                }
+            }
+        }
+        drains
+    }
+
+    /// Lower and upper corner of a cell of the flow.
+    fn cell(&self, flow: &FaceFlow, cell: usize) -> [[f64; D]; 2] {
+        let place = flow.cells.place(cell);
+        let edge = |axis: usize, end: usize| {
+            let index = self.plan.axes[axis].index;
+            flow.cells.edges()[index][place[index] + end]
+        };
+        [0, 1].map(|end| std::array::from_fn(|axis| edge(axis, end)))
     }
 
     fn ends(&self, axis: usize) -> Result<Ends<D>, RunError> {
@@ -139,8 +169,10 @@ impl<'a, const D: usize> Site<'a, D> {
     ) -> Result<Vec<Part<D>>, RunError> {
         let mut parts = vec![self.initial(population)?];
         let species = self.transport.populations[population].species;
-        for source in self.transport.sources.iter().filter(|source| source.species == species) {
-            parts.push(self.source(tracker, source, population));
+        for (idx, source) in self.transport.sources.iter().enumerate() {
+            if source.species == species {
+                parts.push(self.source(tracker, source, population, 1 + idx));
+            }
         }
         for axis in 0..D {
             for end in 0..2 {
@@ -177,14 +209,20 @@ impl<'a, const D: usize> Site<'a, D> {
             Placement::Ordered => Sampling::Ordered,
         };
         Ok(Part {
-            name: "initial".into(),
+            door: 0,
             mass: cells.total(),
             place: Place::Cells(cells),
             shape: Shape::Steady { from: 0.0, to: 0.0, sampling },
         })
     }
 
-    fn source<M: Medium<D>>(&self, tracker: &Tracker<D, M>, source: &Source, population: usize) -> Part<D> {
+    fn source<M: Medium<D>>(
+        &self,
+        tracker: &Tracker<D, M>,
+        source: &Source,
+        population: usize,
+        door: usize,
+    ) -> Part<D> {
         let array = |list: &[f64]| std::array::from_fn(|axis| list.get(axis).copied().unwrap_or(0.0));
         let place = match &source.region {
             Region::Point(at) => Place::Point(array(at)),
@@ -205,7 +243,7 @@ impl<'a, const D: usize> Site<'a, D> {
             Strength::Rate(rate) => (rate * (to - from).max(0.0), Shape::Steady { from, to, sampling }),
             Strength::Held(c) => self.filled(tracker, population, c, &place, (from, to)),
         };
-        Part { name: source.name.clone(), mass, place, shape }
+        Part { door, mass, place, shape }
     }
 
     /// A box whose water is kept at a concentration: it is filled again in each step.
@@ -279,7 +317,7 @@ impl<'a, const D: usize> Site<'a, D> {
         let Some(tape) = tapes.get(of.species) else { return Vec::new() };
         let sign = if end == 0 { 1.0 } else { -1.0 };
         let duration = self.plan.time.duration;
-        let name = format!("side {}", 2 * axis + end);
+        let door = 1 + self.transport.sources.len() + 2 * axis + end;
         let mut flux = Vec::new();
         let mut parts = Vec::new();
         for (low, high) in self.faces([axis, end], idx, (tape, if is_held { HELD_CUTS } else { CUTS })) {
@@ -302,7 +340,7 @@ impl<'a, const D: usize> Site<'a, D> {
             let density = c * porosity * of.retardation * area;
             let step = entry(self.plan.time.step);
             parts.push(Part {
-                name: name.clone(),
+                door,
                 mass: density * entry(duration).total(),
                 place: Place::Box(low, high),
                 shape: Shape::Held { per_step: density * step.total(), entry: step, axis, sign },
@@ -311,7 +349,7 @@ impl<'a, const D: usize> Site<'a, D> {
         if !is_held {
             let faces = Faces::new(flux);
             parts.push(Part {
-                name,
+                door,
                 mass: faces.total() * duration,
                 place: Place::Faces(faces),
                 shape: Shape::Steady { from: 0.0, to: duration, sampling: Sampling::Stratified },
@@ -395,7 +433,7 @@ fn law(rule: &SideRule) -> Law {
 
 /// Mass from one place, before it is cut into particles.
 struct Part<const D: usize> {
-    name: String,
+    door: usize,
     mass: f64,
     place: Place<D>,
     shape: Shape<D>,
@@ -442,6 +480,6 @@ impl<const D: usize> Part<D> {
                 (fill / n, Kind::Filled { n: n as u64, low, high, from, to })
             }
         };
-        Release { name: self.name, origin, population, unit, place: self.place, kind }
+        Release { door: self.door, origin, population, unit, place: self.place, kind }
     }
 }

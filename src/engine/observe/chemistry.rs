@@ -35,7 +35,7 @@ impl Needs {
             match output.kind {
                 OutputKind::Particles => reacted.fill(true),
                 OutputKind::Mixing => {}
-                OutputKind::Profile | OutputKind::Map | OutputKind::Total | OutputKind::Covariance => {
+                _ => {
                     for quantity in &output.quantities {
                         match *quantity {
                             Quantity::Species(idx) => reacted[idx] = true,

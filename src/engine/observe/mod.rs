@@ -7,6 +7,7 @@ mod chemistry;
 mod lab;
 mod look;
 mod mixing;
+mod spread;
 mod tally;
 
 use super::average::{Means, blocks_per_group};

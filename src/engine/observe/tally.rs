@@ -9,6 +9,7 @@ use super::super::program::{Program, Term};
 use super::super::snapshot::Values;
 use super::lab::Lab;
 use super::mixing::Mixing;
+use super::spread;
 use crate::plan::{Output, OutputKind, Quantity};
 use crate::state::grid::Grid;
 use crate::state::particles::CHUNK;
@@ -34,6 +35,13 @@ pub enum Tally<'a, const D: usize> {
         in_bins: Vec<Option<f64>>,
     },
     Mixing(Mixing<'a, D>),
+    Moments {
+        species: Vec<usize>,
+    },
+    Dilution {
+        bins: Bins<D>,
+        species: Vec<usize>,
+    },
     /// Collected apart, as nothing is summed.
     Particles,
 }
@@ -105,15 +113,23 @@ impl<'a, const D: usize> Tally<'a, D> {
             }
             OutputKind::Mixing => Self::Mixing(mixing?),
             OutputKind::Particles => Self::Particles,
+            OutputKind::Moments => Self::Moments { species: species(output) },
+            OutputKind::Dilution => {
+                Self::Dilution { bins: Bins::new(program, output)?, species: species(output) }
+            }
+            // Only particles that carry mass have these: a plan that asks for them is not run here.
+            OutputKind::Breakthrough | OutputKind::FirstPassage | OutputKind::Budget => return None,
         })
     }
 
     /// Bins over which it sums: what decides how blocks are grouped.
     pub fn n_places(&self) -> usize {
         match self {
-            Self::Binned { bins, .. } | Self::Covariance { bins, .. } => bins.grid.n_slots(),
+            Self::Binned { bins, .. } | Self::Covariance { bins, .. } | Self::Dilution { bins, .. } => {
+                bins.grid.n_slots()
+            }
             Self::Mixing(mixing) => mixing.n_slots(),
-            Self::Total { .. } | Self::Particles => 1,
+            Self::Total { .. } | Self::Moments { .. } | Self::Particles => 1,
         }
     }
 
@@ -126,6 +142,8 @@ impl<'a, const D: usize> Tally<'a, D> {
             Self::Covariance { bins, pairs } => bins.grid.n_slots() * (1 + 2 * pairs.len()),
             Self::Total { species, .. } => species.len(),
             Self::Mixing(mixing) => mixing.n_sums(),
+            Self::Moments { species } => species.len() * (1 + D),
+            Self::Dilution { bins, species } => bins.grid.n_slots() * (1 + species.len()),
             Self::Particles => 0,
         }
     }
@@ -135,7 +153,8 @@ impl<'a, const D: usize> Tally<'a, D> {
         match self {
             Self::Binned { bins, species, .. } => bins.grid.n_slots() * species.len(),
             Self::Covariance { bins, pairs } => bins.grid.n_slots() * pairs.len(),
-            Self::Total { .. } | Self::Mixing(_) | Self::Particles => 0,
+            Self::Moments { species } => species.len() * spread::N_PRODUCTS,
+            Self::Total { .. } | Self::Mixing(_) | Self::Dilution { .. } | Self::Particles => 0,
         }
     }
 
@@ -158,6 +177,11 @@ impl<'a, const D: usize> Tally<'a, D> {
                 }
             }
             Self::Mixing(mixing) => mixing.add(lab, sums),
+            Self::Moments { species } => spread::add_first(lab, species, sums),
+            Self::Dilution { bins, species } => {
+                let own = species.iter().map(|&idx| &lab.species[idx]);
+                add_binned(bins, lab, &own.collect::<Vec<_>>(), sums);
+            }
             Self::Particles => {}
         }
     }
@@ -170,7 +194,8 @@ impl<'a, const D: usize> Tally<'a, D> {
                 add_influences(bins, lab, species, follow, first, sums);
             }
             Self::Covariance { bins, pairs } => add_products(bins, lab, pairs, first, sums),
-            Self::Total { .. } | Self::Mixing(_) | Self::Particles => {}
+            Self::Moments { species } => spread::add_second(lab, species, first, sums),
+            Self::Total { .. } | Self::Mixing(_) | Self::Dilution { .. } | Self::Particles => {}
         }
     }
 
@@ -190,6 +215,10 @@ impl<'a, const D: usize> Tally<'a, D> {
                 Some(Values::Total { amount: sums.map(|sum| volume * sum).collect() })
             }
             Self::Mixing(mixing) => Some(Values::Mixing(mixing.states(first))),
+            Self::Moments { species } => Some(spread::moments(program, species.len(), first, second)),
+            Self::Dilution { bins, species } => {
+                Some(spread::dilutions(program, bins.grid.n_bins(), species.len(), first))
+            }
             Self::Particles => None,
         }
     }

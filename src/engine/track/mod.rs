@@ -5,6 +5,7 @@
 //! others, in any order.
 
 pub mod cells;
+pub mod drains;
 pub mod duals;
 pub mod formula;
 pub mod interfaces;

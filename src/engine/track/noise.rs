@@ -56,6 +56,15 @@ impl Draws {
         }
     }
 
+    /// Draws of their own for a look ahead, which leaves all others as they are.
+    pub fn aside(seed: u64, per_step: usize, is_double: bool) -> Self {
+        Self {
+            walk: Stream::new(seed, Purpose::Bridge),
+            wall: Stream::new(seed, Purpose::BridgeWall),
+            ..Self::new(seed, per_step, is_double)
+        }
+    }
+
     /// Displacements that one draw serves.
     pub fn steps_per_draw(&self) -> u64 {
         (PER_DRAW / self.per_step) as u64

@@ -3,6 +3,7 @@
 //! Owns the order of work within a displacement. May use media, walls and monitors. It deliberately stores
 //! nothing: a group comes in, and goes on or leaves.
 
+use super::drains::Drain;
 use super::interfaces::Interface;
 use super::lanes::{LANES, Lane, Lanes};
 use super::medium::{Carrier, Criteria, Leap, Medium};
@@ -11,6 +12,10 @@ use super::noise::{Draws, Normals};
 use super::walls::{Ends, Exit, Stride};
 use crate::maths::wide::Width;
 
+/// Part of a step before which nothing happens in it: what does is told apart from the step before, whose end
+/// is known up to rounding.
+pub const EARLIEST: f64 = 4e-9;
+
 /// Displacements that one step may be cut into.
 pub const MOST_SUB_STEPS: u64 = 1 << 14;
 
@@ -18,8 +23,10 @@ pub const MOST_SUB_STEPS: u64 = 1 << 14;
 pub struct Tracker<const D: usize, M: Medium<D>> {
     pub medium: M,
     pub ends: [Ends<D>; D],
-    pub planes: Vec<Plane<D>>,
+    /// Boxes that water is taken from.
+    pub drains: Vec<Drain<D>>,
     pub interfaces: Vec<Interface>,
+    pub planes: Vec<Plane>,
     pub draws: Draws,
     /// Steps of each particle's own, if any.
     pub criteria: Option<Criteria>,
@@ -107,14 +114,15 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
                         bench.leap.assign(&left);
                     }
                     self.medium.look(carrier, &bench.lanes.positions, &mut bench.look);
-                    self.displace(carrier, step, t + steps.dt, &left, bench, events);
+                    let start: Lane = left.map(|left| t + (steps.dt - left));
+                    self.displace(carrier, step, (&start, t + EARLIEST * steps.dt), bench, events);
                     bench.displacements += bench.lanes.n as u64;
                     if is_late {
                         bench.leap.assign(&[steps.dt; LANES]);
                     }
                 }
                 Some(criteria) => {
-                    self.sub_steps(carrier, criteria, (step, t + steps.dt), left, bench, events)?
+                    self.sub_steps(carrier, criteria, (step, t, steps.dt), left, bench, events)?
                 }
             }
             if bench.lanes.gone & bench.lanes.occupied() == bench.lanes.occupied() {
@@ -130,7 +138,7 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
         &self,
         carrier: &Carrier,
         criteria: &Criteria,
-        (step, end): (u64, f64),
+        (step, t, dt): (u64, f64, f64),
         mut left: Lane,
         bench: &mut Bench<D, M>,
         events: &mut impl Events,
@@ -139,7 +147,7 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
         for sub_step in 0..MOST_SUB_STEPS {
             self.medium.look(carrier, &bench.lanes.positions, &mut bench.look);
             self.medium.longest(&bench.look, criteria, &mut time);
-            let before = left;
+            let start: Lane = left.map(|left| t + dt - left);
             let mut is_going = 0_u64;
             for lane in 0..LANES {
                 // A sliver of a sub-step is taken with the one before it.
@@ -149,7 +157,8 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
                 bench.displacements += u64::from(lane < bench.lanes.n && time[lane] > 0.0);
             }
             bench.leap.assign(&time);
-            self.displace(carrier, step * MOST_SUB_STEPS + sub_step, end, &before, bench, events);
+            let start = (&start, t + EARLIEST * dt);
+            self.displace(carrier, step * MOST_SUB_STEPS + sub_step, start, bench, events);
             let going = is_going & bench.lanes.occupied() & !bench.lanes.gone;
             if going == 0 {
                 return Ok(());
@@ -161,14 +170,14 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
         Ok(())
     }
 
-    /// One displacement of all lanes over the times of the leap; it begins when so much is `left` to the `end`.
+    /// One displacement of all lanes from `start` on, over the times of the leap. Nothing happens before
+    /// `earliest`.
     #[inline(always)]
     fn displace(
         &self,
         carrier: &Carrier,
         number: u64,
-        end: f64,
-        left: &Lane,
+        (start, earliest): (&Lane, f64),
         bench: &mut Bench<D, M>,
         events: &mut impl Events,
     ) {
@@ -190,18 +199,23 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
         for (idx, interface) in self.interfaces.iter().enumerate() {
             interface.apply(idx, &stride, lanes);
         }
+        let free = (!self.planes.is_empty()).then_some(lanes.positions);
         for (axis, ends) in self.ends.iter().enumerate() {
             ends.apply(axis, &stride, lanes, exits);
         }
         for (idx, plane) in self.planes.iter().enumerate() {
-            plane.crossings(&before, lanes, was_gone, |crossing| {
-                let t = end - left[crossing.lane] + crossing.fraction * leap.time[crossing.lane];
-                events.crossed(lanes.ids[crossing.lane], idx, crossing, t);
+            let Some(free) = &free else { continue };
+            plane.crossings(idx, &stride, free, lanes, was_gone, |crossing| {
+                let t = start[crossing.lane] + crossing.fraction * leap.time[crossing.lane];
+                events.crossed(lanes.ids[crossing.lane], idx, crossing, t.max(earliest));
             });
         }
+        for (idx, drain) in self.drains.iter().enumerate() {
+            drain.apply(idx, &stride, lanes, exits);
+        }
         for exit in exits.drain(..) {
-            let t = end - left[exit.lane] + exit.fraction * leap.time[exit.lane];
-            events.left(lanes.ids[exit.lane], exit, t);
+            let t = start[exit.lane] + exit.fraction * leap.time[exit.lane];
+            events.left(lanes.ids[exit.lane], exit, t.max(earliest));
         }
     }
 }

@@ -26,6 +26,18 @@ const MOST_PANELS: usize = 9;
 /// Places of a curve that are drawn.
 const MOST_PLACES: usize = 300;
 
+/// Tables with curves, over a place or over time.
+const KINDS: [Kind; 8] = [
+    Kind::Profile,
+    Kind::Covariance,
+    Kind::Total,
+    Kind::Mixing,
+    Kind::Breakthrough,
+    Kind::FirstPassage,
+    Kind::Moments,
+    Kind::Dilution,
+];
+
 const PATTERNS: [Pattern; 4] = [&[], &[6.0, 2.5], &[2.0, 2.0], &[8.0, 2.5, 2.0, 2.5]];
 
 /// The body of a section for each kind that is there, and their tables.
@@ -35,7 +47,7 @@ pub fn bands(folder: &Path, study: &Study) -> Result<(String, Vec<(String, Strin
     let points = spread(&done, MOST_POINTS);
     let most_times = if points.len() > 1 { 1 } else { MOST_TIMES };
     let (mut body, mut files) = (String::new(), Vec::new());
-    for kind in [Kind::Profile, Kind::Covariance, Kind::Total, Kind::Mixing] {
+    for kind in KINDS {
         let courses = courses::read(folder, kind, &points, most_times)?;
         if courses.is_empty() {
             continue;
@@ -164,7 +176,9 @@ impl Story<'_> {
         let (title, what) = match self.kind {
             Kind::Covariance => (format!("cov({name})"), "covariance"),
             Kind::Mixing => (format!("γ({name})"), "γ"),
-            Kind::Total => (format!("total {name}"), "amount"),
+            Kind::Total | Kind::Moments => (format!("total {name}"), "amount"),
+            Kind::FirstPassage => (format!("first passage of {name}"), "amount"),
+            Kind::Dilution => (format!("dilution of {name}"), "dilution index"),
             _ => (name.clone(), "concentration"),
         };
         Panel {
@@ -220,6 +234,10 @@ fn heading(kind: Kind) -> String {
         Kind::Covariance => "Covariances",
         Kind::Total => "Totals",
         Kind::Mixing => "Mixing",
+        Kind::Breakthrough => "Breakthrough",
+        Kind::FirstPassage => "First passage",
+        Kind::Moments => "Moments",
+        Kind::Dilution => "Dilution",
         other => other.name(),
     };
     escape(text)

@@ -37,7 +37,7 @@ impl Course {
 
 /// Times of curves over a place that are shown, for each point by itself.
 pub fn read(folder: &Path, kind: Kind, points: &[u32], most_times: usize) -> Result<Vec<Course>, TableError> {
-    let is_over_time = matches!(kind, Kind::Total | Kind::Mixing);
+    let is_over_time = !matches!(kind, Kind::Profile | Kind::Map | Kind::Covariance);
     let times = if is_over_time { BTreeMap::new() } else { times(folder, kind, points, most_times)? };
     let mut gathered = Gathered { courses: Vec::new(), last: 0, is_over_time, is_pair: false };
     let (value, words): (&str, &[&str]) = match kind {
@@ -45,7 +45,11 @@ pub fn read(folder: &Path, kind: Kind, points: &[u32], most_times: usize) -> Res
         Kind::Total => ("amount", &["unit", "species"]),
         Kind::Covariance => ("covariance", &["unit", "species_a", "species_b"]),
         Kind::Mixing => ("gamma", &["unit", "species_a", "species_b"]),
-        Kind::Particles | Kind::Errors | Kind::ErrorBars => return Ok(Vec::new()),
+        Kind::Breakthrough => ("concentration", &["unit", "species"]),
+        Kind::FirstPassage => ("cumulative", &["unit", "species"]),
+        Kind::Moments => ("amount", &["unit", "species"]),
+        Kind::Dilution => ("index", &["unit", "species"]),
+        Kind::Particles | Kind::Budget | Kind::Errors | Kind::ErrorBars => return Ok(Vec::new()),
     };
     gathered.is_pair = words.len() == 3;
     let mut numbers = vec!["point", "output", "t", value];

@@ -4,7 +4,8 @@
 
 use crate::syntax::tree::{
     Assignment, Axis, Count, DarcyEntry, DarcyKind, Dispersion, Expr, ExprKind, Field, FlowArgument, Name,
-    Range, Rate, RegionArgument, Source, StatementKind, SweepAxis, SweepEntry, SweepValue, Times,
+    Output, Place, Range, Rate, RegionArgument, Source, StatementKind, SweepAxis, SweepEntry, SweepValue,
+    Times,
 };
 
 /// What is done at each place.
@@ -58,14 +59,7 @@ pub(super) fn visit(kind: &mut StatementKind, visitor: &mut impl Visitor) {
             expression(&mut it.duration, visitor);
             it.step.iter_mut().for_each(|it| expression(it, visitor));
         }
-        StatementKind::Output(it) => {
-            expressions(&mut it.grid, visitor);
-            match &mut it.times {
-                Some(Times::List(list)) => expressions(list, visitor),
-                Some(Times::Every(every)) => expression(every, visitor),
-                None => {}
-            }
-        }
+        StatementKind::Output(it) => output(it, visitor),
         StatementKind::Reference(it) => {
             it.target.species.iter_mut().for_each(|name| visitor.dotted(name));
             expression(&mut it.value, visitor);
@@ -82,6 +76,20 @@ pub(super) fn visit(kind: &mut StatementKind, visitor: &mut impl Visitor) {
         | StatementKind::Seed(_)
         | StatementKind::Use(_)
         | StatementKind::Report(_) => {}
+    }
+}
+
+fn output(it: &mut Output, visitor: &mut impl Visitor) {
+    expressions(&mut it.grid, visitor);
+    match &mut it.place {
+        Some(Place::Plane(_, at)) => expression(at, visitor),
+        Some(Place::Box(_, ranges)) => ranges.iter_mut().for_each(|it| range(it, visitor)),
+        Some(Place::Side(_)) | None => {}
+    }
+    match &mut it.times {
+        Some(Times::List(list)) => expressions(list, visitor),
+        Some(Times::Every(every)) => expression(every, visitor),
+        None => {}
     }
 }
 

@@ -26,6 +26,12 @@ impl Parts<'_> {
         std::iter::from_fn(|| self.optional_expression().transpose()).collect()
     }
 
+    /// The next range, if one follows.
+    pub fn take_range(&mut self) -> Option<Built<Range>> {
+        let is_next = self.pairs.peek().is_some_and(|pair| pair.as_rule() == Rule::range);
+        is_next.then(|| self.range())
+    }
+
     pub fn range(&mut self) -> Built<Range> {
         let pair = self.need(Rule::range)?;
         let mut parts = Parts::of(self.place, pair);

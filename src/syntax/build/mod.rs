@@ -111,6 +111,7 @@ fn is_punctuation(rule: Rule) -> bool {
             | R::colon
             | R::plus
             | R::assign
+            | R::box_word
             | R::open_round
             | R::close_round
             | R::open_brace

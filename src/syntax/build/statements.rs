@@ -10,9 +10,9 @@ use crate::source::{Span, Spanned};
 use crate::syntax::climb::Built;
 use crate::syntax::grammar::Rule;
 use crate::syntax::tree::{
-    Arrow, Assignment, Average, Axis, Count, Domain, Expr, ExprKind, Field, Function, Let, Measure, Output,
-    Param, Particles, Qualifier, Rate, Reaction, Reference, Run, Species, StatementKind, Target, Term, Times,
-    UnaryOperator, Use, Zone,
+    self, Arrow, Assignment, Average, Axis, Count, Domain, Expr, ExprKind, Field, Function, Let, Measure,
+    Output, Param, Particles, Qualifier, Rate, Reaction, Reference, Run, Species, StatementKind, Target,
+    Term, Times, UnaryOperator, Use, Zone,
 };
 use pest::iterators::Pair;
 
@@ -277,6 +277,8 @@ fn output(parts: &mut Parts) -> Built<Output> {
         along: clauses.along.value(),
         grid: clauses.on.value().unwrap_or_default(),
         unit: clauses.unit.value(),
+        place: clauses.place.value(),
+        averaging: clauses.averaging.value(),
     })
 }
 
@@ -323,6 +325,8 @@ struct Clauses {
     on: Once<Vec<Expr>>,
     unit: Once<Spanned<String>>,
     over: Once<Axis>,
+    place: Once<tree::Place>,
+    averaging: Once<Spanned<String>>,
 }
 
 impl Clauses {
@@ -337,10 +341,19 @@ impl Clauses {
 
     fn add(&mut self, place: Place, pair: Pair<Rule>) -> Built<()> {
         let (rule, span) = (pair.as_rule(), keyword_span(place, &pair));
+        let (whole, text) = (span_at(place, &pair), pair.as_str().trim().to_owned());
         let mut inner = Parts::of(place, pair);
         match rule {
             Rule::at => self.times.set("at` or `every", span, Times::List(inner.expressions()?)),
             Rule::every => self.times.set("at` or `every", span, Times::Every(inner.expression()?)),
+            Rule::at_place => self.place.set("at` a place or `in box", span, output_place(&mut inner)?),
+            Rule::in_box => {
+                let ranges = std::iter::from_fn(|| inner.take_range()).collect::<Built<Vec<_>>>()?;
+                self.place.set("at` a place or `in box", span, tree::Place::Box(whole, ranges))
+            }
+            Rule::averaging => {
+                self.averaging.set("resident` or `flux_weighted", span, Spanned::new(text, whole))
+            }
             Rule::along => self.along.set("along", span, spanned(place, &inner.need(Rule::axis_name)?)),
             Rule::on => self.on.set("on", span, counts(&mut inner)?),
             Rule::in_unit => self.unit.set("in", span, spanned(place, &inner.need(Rule::unit)?)),
@@ -351,6 +364,15 @@ impl Clauses {
             ),
         }
     }
+}
+
+/// `at x = 10 m` or `at right`
+fn output_place(parts: &mut Parts) -> Built<tree::Place> {
+    if let Some(side) = parts.take(Rule::side) {
+        return Ok(tree::Place::Side(spanned(parts.place, &side)));
+    }
+    let name = parts.need(Rule::axis_name)?;
+    Ok(tree::Place::Plane(spanned(parts.place, &name), parts.expression()?))
 }
 
 /// The place of the word that a clause begins with.

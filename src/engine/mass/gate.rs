@@ -1,0 +1,232 @@
+//! What goes through planes and sides, in bins of time.
+//!
+//! Owns the bins of breakthroughs and first passages. May use exact sums and the plan. It deliberately moves
+//! nothing: it is told what happened.
+
+use super::super::schedule::{Due, step_length};
+use super::super::snapshot::{Row, Snapshot, Values};
+use super::super::track::monitors::{Plane, Watch};
+use super::book::{Event, What};
+use super::flock;
+use crate::maths::exact::{Quanta, Sum};
+use crate::plan::{Output, OutputKind, Plan, Quantity, Station};
+
+/// Times on steps hold everything of the step before, which rounding may put a little later: so much of the next step,
+/// in which nothing happens as early.
+const SLACK: f64 = 1e-9;
+
+/// What a gate hears of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Trigger {
+    /// Number among the tracker's planes.
+    Plane(usize),
+    Side(usize),
+}
+
+/// One output of what passes a place.
+#[derive(Debug, Clone)]
+pub struct Gate {
+    output_idx: usize,
+    trigger: Trigger,
+    is_first_passage: bool,
+    /// Water through the place in the direction that counts, m³/s (m², m with fewer axes).
+    water: f64,
+    /// Populations of the output's species.
+    populations: Vec<Option<usize>>,
+    times: Vec<f64>,
+    /// Until when each bin reaches, s; and the steps that must be over before it is handed out.
+    ends: Vec<f64>,
+    steps: Vec<u64>,
+    bins: Vec<Vec<Bin>>,
+    /// Per species the sum of all bins that were handed out.
+    so_far: Vec<Sum>,
+    n_done: usize,
+    /// Particles that have been here, a bit each, by origin.
+    seen: Vec<Vec<u64>>,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Bin {
+    net: Sum,
+    n: u64,
+}
+
+/// All gates of a run.
+#[derive(Debug, Clone, Default)]
+pub struct Gates {
+    gates: Vec<Gate>,
+}
+
+impl Gates {
+    /// Takes the outputs of gates out of the dues, and their planes to the tracker's. `water` tells how much
+    /// goes through a station.
+    pub fn new(
+        plan: &Plan,
+        dues: &mut Vec<Due>,
+        planes: &mut Vec<Plane>,
+        period: impl Fn(usize) -> Option<f64>,
+        water: impl Fn(&Station) -> f64,
+    ) -> Self {
+        let mut gates = Vec::new();
+        let has_sub_steps = plan.transport.as_ref().is_some_and(|transport| transport.sub_steps.is_some());
+        for (output_idx, output) in plan.outputs.iter().enumerate() {
+            let Some(station) = output.station.as_ref().filter(|_| is_gate(output)) else { continue };
+            let own: Vec<&Due> = dues.iter().filter(|due| due.outputs.contains(&output_idx)).collect();
+            let is_first_passage = output.kind == OutputKind::FirstPassage;
+            let watch = match (is_first_passage, has_sub_steps || own.iter().any(|due| due.fraction > 0.0)) {
+                (true, _) => Watch::Touch,
+                (false, true) => Watch::Times,
+                (false, false) => Watch::Ends,
+            };
+            let trigger = match *station {
+                Station::Plane { axis, at } => {
+                    let plane = Plane { axis, at, period: period(axis), watch };
+                    let number = planes.iter().position(|other| *other == plane).unwrap_or_else(|| {
+                        planes.push(plane);
+                        planes.len() - 1
+                    });
+                    Trigger::Plane(number)
+                }
+                Station::Side(side) => Trigger::Side(side),
+                Station::Box { .. } => continue,
+            };
+            let time = &plan.time;
+            let end = |due: &Due| match due.fraction == 0.0 {
+                true if due.steps >= time.n_steps => f64::INFINITY,
+                true => due.steps as f64 * time.step + SLACK * step_length(time, due.steps),
+                false => due.t,
+            };
+            let n_times = own.len();
+            gates.push(Gate {
+                output_idx,
+                trigger,
+                is_first_passage,
+                water: water(station),
+                populations: populations(plan, output),
+                times: own.iter().map(|due| due.t).collect(),
+                ends: own.iter().map(|due| end(due)).collect(),
+                steps: own.iter().map(|due| due.steps + u64::from(due.fraction > 0.0)).collect(),
+                bins: vec![vec![Bin::default(); n_times]; output.quantities.len()],
+                so_far: vec![Sum::default(); output.quantities.len()],
+                n_done: 0,
+                seen: Vec::new(),
+            });
+        }
+        for due in dues.iter_mut() {
+            due.outputs.retain(|&idx| !is_gate(&plan.outputs[idx]));
+        }
+        dues.retain(|due| !due.outputs.is_empty());
+        Self { gates }
+    }
+
+    pub fn are_none(&self) -> bool {
+        self.gates.is_empty()
+    }
+
+    #[inline]
+    pub fn note(&mut self, event: &Event, entered_by: Option<usize>, quanta: Quanta) {
+        self.gates.iter_mut().for_each(|gate| gate.note(event, entered_by, quanta));
+    }
+
+    /// Everything that is complete after so many steps.
+    pub fn ready(&mut self, steps: u64) -> Vec<Snapshot> {
+        self.gates.iter_mut().flat_map(|gate| gate.ready(steps)).collect()
+    }
+}
+
+/// Whether an output counts what passes.
+fn is_gate(output: &Output) -> bool {
+    matches!(output.station, Some(Station::Plane { .. } | Station::Side(_)))
+}
+
+/// The populations of an output's species, in its order; nothing is carried by some.
+pub fn populations(plan: &Plan, output: &Output) -> Vec<Option<usize>> {
+    let of = |quantity: &Quantity| {
+        let (Quantity::Species(species) | Quantity::Pair(species, _)) = *quantity;
+        let mut populations = plan.transport.iter().flat_map(|transport| &transport.populations);
+        populations.position(|population| population.species == species)
+    };
+    output.quantities.iter().map(of).collect()
+}
+
+impl Gate {
+    /// `entered_by` is the side that a particle came in through.
+    fn note(&mut self, event: &Event, entered_by: Option<usize>, quanta: Quanta) {
+        let sign = match (self.trigger, event.what) {
+            (Trigger::Plane(own), What::Crossed { plane, is_forward }) if own == plane => {
+                if is_forward {
+                    1.0
+                } else {
+                    -1.0
+                }
+            }
+            (Trigger::Side(own), What::Left { side, .. }) if own == side => 1.0,
+            (Trigger::Side(own), What::Entered { .. }) if entered_by == Some(own) => {
+                if self.is_first_passage {
+                    return;
+                }
+                -1.0
+            }
+            _ => return,
+        };
+        if self.is_first_passage && !self.is_new(event.id) {
+            return;
+        }
+        let bin = self.ends.partition_point(|&end| end < event.t);
+        if bin == self.ends.len() {
+            return;
+        }
+        let mass = if self.is_first_passage { event.mass } else { sign * event.mass };
+        for (own, bins) in self.populations.iter().zip(&mut self.bins) {
+            if *own == Some(event.population) {
+                quanta.add(&mut bins[bin].net, mass);
+                bins[bin].n += 1;
+            }
+        }
+    }
+
+    /// Whether a particle is here for the first time; from now on it is not.
+    fn is_new(&mut self, id: u64) -> bool {
+        let (origin, count) = (flock::origin(id), flock::count(id) as usize);
+        if self.seen.len() <= origin {
+            self.seen.resize(origin + 1, Vec::new());
+        }
+        let bits = &mut self.seen[origin];
+        if bits.len() <= count / 64 {
+            bits.resize(count / 64 + 1, 0);
+        }
+        let bit = 1_u64 << (count % 64);
+        let is_new = bits[count / 64] & bit == 0;
+        bits[count / 64] |= bit;
+        is_new
+    }
+
+    fn ready(&mut self, steps: u64) -> Vec<Snapshot> {
+        let mut snapshots = Vec::new();
+        while self.n_done < self.times.len() && self.steps[self.n_done] <= steps {
+            snapshots.push(self.hand_out(self.n_done));
+            self.n_done += 1;
+        }
+        snapshots
+    }
+
+    fn hand_out(&mut self, bin: usize) -> Snapshot {
+        let t = self.times[bin];
+        let dt = t - if bin == 0 { 0.0 } else { self.times[bin - 1] };
+        let known = |value: f64, is_known: bool| if is_known { value } else { f64::NAN };
+        let mut rows = Vec::new();
+        for (bins, so_far) in self.bins.iter().zip(&mut self.so_far) {
+            let Bin { net, n } = bins[bin];
+            so_far.merge(net);
+            // Not a number at once: 0 / 0 and x / 0 have no value.
+            let rate = known(net.value() / dt, dt > 0.0);
+            let concentration = known(rate / self.water, self.water != 0.0);
+            let numbers = match self.is_first_passage {
+                true => vec![so_far.value(), rate, n as f64],
+                false => vec![concentration, rate, so_far.value(), n as f64],
+            };
+            rows.push(vec![Row { place: 0, numbers }]);
+        }
+        Snapshot { output_idx: self.output_idx, t, values: Values::Rows(rows) }
+    }
+}

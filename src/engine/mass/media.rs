@@ -1,0 +1,128 @@
+//! From flow and dispersion of a plan to the medium of a walk.
+//!
+//! Owns the choice of the medium. May use the plan and `track`. It deliberately runs nothing itself.
+
+use super::super::control::{Control, Settings};
+use super::super::error::RunError;
+use super::super::program::unsound;
+use super::super::snapshot::Outcome;
+use super::super::track::cells::{CellMedium, Dispersivity};
+use super::super::track::formula::{Formula, Spreading};
+use super::super::track::uniform::Uniform;
+use super::run::{Sink, go};
+use super::world::Site;
+use crate::flow::build;
+use crate::plan::Plan;
+use crate::plan::tape::{Operation, Tape};
+use crate::plan::transport::{Dispersion, Flow};
+use std::sync::Arc;
+
+/// Runs a plan of masses; the medium is matched here, once.
+pub fn run<const D: usize>(
+    plan: &Plan,
+    settings: &Settings,
+    control: &dyn Control,
+    sink: Sink,
+) -> Result<Outcome, RunError> {
+    let flow = match &settings.flow {
+        Some(flow) => Some(flow.clone()),
+        None => build::of(plan)
+            .map_err(|error| RunError::Flow(error.to_string()))?
+            .map(|solution| Arc::new(solution.flow)),
+    };
+    let site = Site::<D>::new(plan, flow)?;
+    match (&site.transport.flow, &site.transport.dispersion) {
+        (Flow::Uniform(velocity), Dispersion::Constant(_) | Dispersion::Velocity { .. })
+            if is_constant(&site.transport.porosity) =>
+        {
+            let velocity: [f64; D] =
+                velocity.clone().try_into().map_err(|_| unsound("a velocity that does not fit the axes"))?;
+            go(&site, uniform(plan, velocity, &site.transport.dispersion)?, settings, control, sink)
+        }
+        (Flow::Uniform(_) | Flow::Expression(_), _) => go(&site, formula(&site)?, settings, control, sink),
+        (
+            Flow::Darcy(_) | Flow::File(_),
+            Dispersion::Velocity { longitudinal, transverse, molecular, .. },
+        ) => {
+            let flow = site.flow.as_ref().ok_or_else(|| unsound("a flow that nobody solved"))?;
+            let axes = std::array::from_fn(|axis| plan.axes[axis].index);
+            let dispersivity =
+                Dispersivity { longitudinal: *longitudinal, transverse: *transverse, molecular: *molecular };
+            let medium = CellMedium::<D>::new(flow, axes, dispersivity)
+                .ok_or_else(|| unsound("cells that are not equal, or porosity that varies"))?;
+            go(&site, medium, settings, control, sink)
+        }
+        _ => Err(unsound("flow and dispersion that do not go together yet")),
+    }
+}
+
+fn is_constant(tape: &Tape) -> bool {
+    matches!(tape.operations[..], [Operation::Constant(_)])
+}
+
+/// A medium of expressions.
+fn formula<const D: usize>(site: &Site<D>) -> Result<Formula<D>, RunError> {
+    let constant = |value: f64| Tape { operations: vec![Operation::Constant(value)] };
+    let velocity: Vec<Tape> = match &site.transport.flow {
+        Flow::Uniform(velocity) => velocity.iter().map(|&v| constant(v)).collect(),
+        Flow::Expression(tapes) => tapes.clone(),
+        Flow::Darcy(_) | Flow::File(_) => return Err(unsound("a flow without expressions")),
+    };
+    let spreading = match &site.transport.dispersion {
+        Dispersion::Constant(triangle) => Spreading::Constant(triangle_of(triangle)?, 0.0),
+        Dispersion::Isotropic(tape) => Spreading::Isotropic(tape.clone()),
+        Dispersion::Velocity { longitudinal, transverse, molecular, .. } => Spreading::Velocity {
+            longitudinal: *longitudinal,
+            transverse: *transverse,
+            molecular: *molecular,
+        },
+    };
+    Ok(Formula {
+        axes: std::array::from_fn(|axis| site.plan.axes[axis].index),
+        velocity: velocity.try_into().map_err(|_| unsound("a velocity that does not fit the axes"))?,
+        spreading,
+        porosity: site.transport.porosity.clone(),
+        width: std::array::from_fn(|axis| site.high[axis] - site.low[axis]),
+    })
+}
+
+/// A lower triangle, row by row.
+fn triangle_of<const D: usize>(entries: &[f64]) -> Result<[[f64; D]; D], RunError> {
+    if entries.len() != D * (D + 1) / 2 {
+        return Err(unsound("a dispersion that does not fit the axes"));
+    }
+    let mut tensor = [[0.0; D]; D];
+    for (row, target) in tensor.iter_mut().enumerate() {
+        target[..=row].copy_from_slice(&entries[row * (row + 1) / 2..][..=row]);
+    }
+    Ok(tensor)
+}
+
+/// A uniform medium from constants, or from lengths along the velocity.
+fn uniform<const D: usize>(
+    plan: &Plan,
+    velocity: [f64; D],
+    dispersion: &Dispersion,
+) -> Result<Uniform<D>, RunError> {
+    let mut tensor = [[0.0; D]; D];
+    let mut own = 0.0;
+    match dispersion {
+        Dispersion::Constant(triangle) => tensor = triangle_of(triangle)?,
+        Dispersion::Velocity { longitudinal, transverse, molecular, .. } => {
+            let speed = velocity.iter().map(|v| v * v).sum::<f64>().sqrt();
+            own = *molecular;
+            for i in 0..D {
+                for j in 0..=i {
+                    let along = if speed > 0.0 { velocity[i] * velocity[j] / speed } else { 0.0 };
+                    tensor[i][j] = (longitudinal - transverse) * along;
+                    if i == j {
+                        tensor[i][j] += transverse * speed + molecular;
+                    }
+                }
+            }
+        }
+        Dispersion::Isotropic(_) => return Err(unsound("a dispersion that varies in a uniform medium")),
+    }
+    let width = std::array::from_fn(|axis| plan.axes[axis].high - plan.axes[axis].low);
+    Ok(Uniform { velocity, dispersion: tensor, molecular: own, width })
+}

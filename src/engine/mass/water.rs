@@ -1,0 +1,94 @@
+//! Water through planes and sides, and in boxes.
+//!
+//! Owns these sums. May use `flow`, media and the plan. It deliberately looks at no particle.
+
+use super::super::track::medium::Medium;
+use super::world::Site;
+use crate::flow::FaceFlow;
+use crate::plan::Station;
+
+/// Points along each other axis at which a flow that is not on cells is looked at.
+const POINTS: usize = 64;
+
+impl<const D: usize> Site<'_, D> {
+    /// Water through a station in the direction that counts, m³/s (m², m with fewer axes).
+    pub fn water<M: Medium<D>>(&self, medium: &M, station: &Station) -> f64 {
+        let (axis, at, sign) = match *station {
+            Station::Plane { axis, at } => (axis, at, 1.0),
+            Station::Side(side) if side % 2 == 0 => (side / 2, self.low[side / 2], -1.0),
+            Station::Side(side) => (side / 2, self.high[side / 2], 1.0),
+            Station::Box { .. } => return f64::NAN,
+        };
+        sign * match &self.flow {
+            Some(flow) => through(flow, self.plan.axes[axis].index, at),
+            None => self.by_points(medium, axis, at),
+        }
+    }
+
+    /// The midpoint rule over a plane.
+    fn by_points<M: Medium<D>>(&self, medium: &M, axis: usize, at: f64) -> f64 {
+        let others: Vec<usize> = (0..D).filter(|&other| other != axis).collect();
+        let area: f64 = others.iter().map(|&other| self.high[other] - self.low[other]).product();
+        let n = POINTS.pow(others.len() as u32);
+        let places: Vec<[f64; D]> = (0..n)
+            .map(|mut idx| {
+                let mut place = self.low;
+                place[axis] = at;
+                for &other in &others {
+                    let part = ((idx % POINTS) as f64 + 0.5) / POINTS as f64;
+                    place[other] += part * (self.high[other] - self.low[other]);
+                    idx /= POINTS;
+                }
+                place
+            })
+            .collect();
+        let porosity = self.evaluate(&self.transport.porosity, &places, 0.0);
+        let sum: f64 = places
+            .iter()
+            .zip(porosity)
+            .map(|(&place, porosity)| porosity * medium.velocity(place, axis))
+            .sum();
+        sum / n as f64 * area
+    }
+
+    /// Mean porosity in a box, by the midpoint rule.
+    pub fn porosity_in(&self, low: &[f64; D], high: &[f64; D]) -> f64 {
+        let per_axis = if D == 3 { POINTS / 4 } else { POINTS };
+        let n = per_axis.pow(D as u32);
+        let places: Vec<[f64; D]> = (0..n)
+            .map(|mut idx| {
+                std::array::from_fn(|axis| {
+                    let part = ((idx % per_axis) as f64 + 0.5) / per_axis as f64;
+                    idx /= per_axis;
+                    low[axis] + part * (high[axis] - low[axis])
+                })
+            })
+            .collect();
+        self.evaluate(&self.transport.porosity, &places, 0.0).iter().sum::<f64>() / n as f64
+    }
+}
+
+/// Discharge through a plane normal to an axis of the scene: linear between the faces on either side, as
+/// velocities in cells are.
+fn through(flow: &FaceFlow, axis: usize, at: f64) -> f64 {
+    let edges = &flow.cells.edges()[axis];
+    let n = flow.cells.n();
+    let cell = edges.partition_point(|&edge| edge <= at).clamp(1, n[axis]) - 1;
+    let part = ((at - edges[cell]) / (edges[cell + 1] - edges[cell])).clamp(0.0, 1.0);
+    let mut sums = [0.0; 2];
+    let mut place = [0; 3];
+    place[axis] = cell;
+    let [a, b] = [0, 1, 2].iter().copied().filter(|&other| other != axis).collect::<Vec<_>>()[..] else {
+        return f64::NAN;
+    };
+    for i in 0..n[a] {
+        for j in 0..n[b] {
+            (place[a], place[b]) = (i, j);
+            let (low, high) = flow.cells.faces(axis, place);
+            let area = flow.cells.face_area(axis, place);
+            sums[0] += area * flow.flux[axis][low];
+            sums[1] += area * flow.flux[axis][high];
+        }
+    }
+    sums[0] + part * (sums[1] - sums[0])
+}
