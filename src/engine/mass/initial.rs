@@ -1,0 +1,32 @@
+//! What is there at the start.
+//!
+//! Owns the mass of a species before anything moves. May use the plan and places. It deliberately draws nothing.
+
+use super::super::error::RunError;
+use super::parts::{Part, Shape};
+use super::place::{Cells, Place};
+use super::release::Sampling;
+use super::world::Site;
+use crate::plan::Placement;
+
+impl<const D: usize> Site<'_, D> {
+    pub fn initial(&self, population: usize) -> Result<Part<D>, RunError> {
+        let of = &self.transport.populations[population];
+        let cells = Cells::new(self.low, self.high, |centres| {
+            let porosity = self.evaluate(&self.transport.porosity, centres, 0.0);
+            let values = self.evaluate(&of.initial, centres, 0.0);
+            porosity.iter().zip(values).map(|(porosity, c)| porosity * of.retardation * c).collect()
+        });
+        let sampling = match self.plan.particles.placement {
+            Placement::Random => Sampling::Random,
+            Placement::Stratified => Sampling::Stratified,
+            Placement::Ordered => Sampling::Ordered,
+        };
+        Ok(Part {
+            door: 0,
+            mass: cells.total(),
+            place: Place::Cells(cells),
+            shape: Shape::Steady { from: 0.0, to: 0.0, sampling },
+        })
+    }
+}

@@ -1,0 +1,161 @@
+//! Blocks of particles on their way through steps, on all threads.
+//!
+//! Owns the work on one block and what came of it. May use the tracker, flocks and books. It deliberately knows no
+//! calendar.
+
+use super::super::error::RunError;
+use super::super::parallel;
+use super::super::track::lanes::{LANES, Lane};
+use super::super::track::medium::{Carrier, Medium};
+use super::super::track::tracker::{Bench, Steps, TooManySubSteps, Tracker};
+use super::book::{Event, Log};
+use super::flock::{self, Flock};
+use super::release::Birth;
+use super::run::Run;
+
+/// What came of a group of blocks.
+#[derive(Default)]
+struct Yield {
+    events: Vec<Event>,
+    trouble: Option<Trouble>,
+    displacements: u64,
+}
+
+#[derive(Debug, Clone, Copy)]
+enum Trouble {
+    SubSteps(TooManySubSteps),
+    Position { id: u64, step: u64 },
+}
+
+impl<const D: usize, M: Medium<D>> Run<'_, D, M> {
+    pub fn move_flocks(&mut self, steps: Steps) -> Result<(), RunError> {
+        let (tracker, carriers, units, benches) = (&self.tracker, &self.carriers, &self.units, &self.benches);
+        let mut tasks: Vec<(&mut Flock<D>, Yield)> =
+            self.flocks.iter_mut().map(|flock| (flock, Yield::default())).collect();
+        parallel::for_each(&mut tasks, &|_, (flock, found)| {
+            if carriers[flock.population].mobility == 0.0 {
+                return;
+            }
+            benches.lend(
+                || Box::new(tracker.bench()),
+                |bench| {
+                    let carrier = &carriers[flock.population];
+                    tracker.width.run(OnFlock { tracker, carrier, units, steps, flock, bench, found });
+                },
+            );
+        });
+        let found: Vec<Yield> = tasks.into_iter().map(|(_, found)| found).collect();
+        found.into_iter().try_for_each(|found| self.take(found))
+    }
+
+    fn take(&mut self, found: Yield) -> Result<(), RunError> {
+        self.note(&found.events);
+        self.displacements += found.displacements;
+        match found.trouble {
+            None => Ok(()),
+            Some(Trouble::Position { id, step }) => {
+                Err(RunError::NonFinitePosition { step: step + 1, particle: flock::count(id) })
+            }
+            Some(Trouble::SubSteps(TooManySubSteps { id, step })) => {
+                Err(RunError::TooManySubSteps { step: step + 1, particle: flock::count(id) })
+            }
+        }
+    }
+
+    /// Takes what begins within a step to the end of the tile, and keeps it.
+    pub fn move_newborn(&mut self, mut births: Vec<Birth<D>>, steps: Steps) -> Result<(), RunError> {
+        births.sort_by_key(|birth| birth.population);
+        let mut rest = &births[..];
+        while let Some(first) = rest.first() {
+            let n = rest.iter().take(LANES).take_while(|birth| birth.population == first.population).count();
+            let (group, others) = rest.split_at(n);
+            rest = others;
+            let mut flock = Flock::new(first.population);
+            let mut entered: Lane = [0.0; LANES];
+            for (lane, birth) in group.iter().enumerate() {
+                flock.push(birth.id, birth.position);
+                entered[lane] = birth.entered;
+            }
+            let carrier = self.carriers[flock.population];
+            let mut found = Yield::default();
+            if carrier.mobility > 0.0 {
+                let (tracker, units) = (&self.tracker, &self.units);
+                self.benches.lend(
+                    || Box::new(tracker.bench()),
+                    |bench| {
+                        go_on(tracker, &carrier, units, steps, Some(&entered), &mut flock, bench, &mut found)
+                    },
+                );
+            }
+            self.take(found)?;
+            for idx in 0..flock.len() {
+                flock::add(&mut self.flocks, flock.population, flock.ids[idx], flock.position(idx));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// One block, to be dispatched to wide or narrow code.
+struct OnFlock<'a, const D: usize, M: Medium<D>> {
+    tracker: &'a Tracker<D, M>,
+    carrier: &'a Carrier,
+    units: &'a [f64],
+    steps: Steps,
+    flock: &'a mut Flock<D>,
+    bench: &'a mut Bench<D, M>,
+    found: &'a mut Yield,
+}
+
+impl<const D: usize, M: Medium<D>> pulp::NullaryFnOnce for OnFlock<'_, D, M> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        go_on(self.tracker, self.carrier, self.units, self.steps, None, self.flock, self.bench, self.found);
+    }
+}
+
+/// Takes a block through steps, 64 particles at a time; those that leave are taken out.
+#[allow(clippy::too_many_arguments)] // All of it is one pass over one block.
+#[inline(always)]
+fn go_on<const D: usize, M: Medium<D>>(
+    tracker: &Tracker<D, M>,
+    carrier: &Carrier,
+    units: &[f64],
+    steps: Steps,
+    entered: Option<&Lane>,
+    flock: &mut Flock<D>,
+    bench: &mut Bench<D, M>,
+    found: &mut Yield,
+) {
+    let n = flock.len();
+    let mut kept = 0;
+    bench.displacements = 0;
+    for first in (0..n).step_by(LANES) {
+        let range = first..(first + LANES).min(n);
+        bench.lanes.load(&flock.ids[range.clone()], flock.positions.each_ref().map(|x| &x[range.clone()]));
+        let mut log = Log { population: flock.population, units, events: &mut found.events };
+        if let Err(problem) = tracker.advance(carrier, steps, entered, bench, &mut log) {
+            found.trouble.get_or_insert(Trouble::SubSteps(problem));
+        }
+        let lanes = &bench.lanes;
+        for lane in 0..range.len() {
+            if lanes.gone >> lane & 1 == 1 {
+                continue;
+            }
+            flock.ids[kept] = lanes.ids[lane];
+            for axis in 0..D {
+                let x = lanes.positions[axis][lane];
+                if !x.is_finite() {
+                    let id = lanes.ids[lane];
+                    found.trouble.get_or_insert(Trouble::Position { id, step: steps.first });
+                }
+                flock.positions[axis][kept] = x;
+            }
+            kept += 1;
+        }
+    }
+    flock.truncate(kept);
+    found.displacements += bench.displacements;
+}
