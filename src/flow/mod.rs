@@ -9,9 +9,11 @@ pub mod cells;
 pub mod darcy;
 pub mod random_field;
 pub mod read;
+pub mod series;
 
 pub use balance::Balance;
 pub use cells::Cells;
+pub use series::FlowSeries;
 
 /// The discharge of water through the faces of cells.
 ///
