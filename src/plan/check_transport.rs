@@ -4,7 +4,7 @@ use super::Plan;
 use super::check::{check_tape, require};
 use super::tape::Tape;
 use super::transport::{
-    Conductivity, Darcy, Dispersion, Flow, Patch, Region, SideRule, Source, Strength, Transport,
+    Conductivity, Darcy, Decay, Dispersion, Flow, Patch, Region, SideRule, Source, Strength, Transport, Turn,
 };
 
 impl Plan {
@@ -71,10 +71,26 @@ impl Plan {
             require(population.molecular.is_none_or(|d| d >= 0.0 && d.is_finite()), wrong)?;
             tape(&population.initial, "an initial concentration")?;
         }
-        let n = transport.populations.len();
-        require(transport.decay.as_ref().is_none_or(|decay| decay.rates.len() == n * n), || {
-            "decay does not fit the populations".into()
-        })
+        transport.decay.as_ref().map_or(Ok(()), |decay| check_decay(decay, transport.populations.len()))
+    }
+}
+
+fn check_decay(decay: &Decay, n: usize) -> Result<(), String> {
+    let is_weight = |weight: &f64| *weight > 0.0 && weight.is_finite();
+    require(decay.weights.len() == n && decay.weights.iter().all(is_weight), || {
+        "a population has no weight".into()
+    })?;
+    let is_right = |turn: &Turn| {
+        let chances: f64 = turn.outcomes.iter().map(|(_, chance)| chance).sum();
+        turn.population < n
+            && turn.rate >= 0.0
+            && turn.rate.is_finite()
+            && turn.outcomes.iter().all(|(to, chance)| *to < n && *chance >= 0.0)
+            && chances <= 1.0 + 1e-12
+    };
+    match decay.reactions.iter().find(|turn| !is_right(turn)) {
+        Some(turn) => Err(format!("reaction `{}` is not well-formed", turn.name)),
+        None => Ok(()),
     }
 }
 

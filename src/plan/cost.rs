@@ -4,7 +4,7 @@ use super::chemistry::{Chemistry, Method};
 use super::integrator::Expected;
 use super::time_scales::TimeScales;
 use super::transport::{Flow, Transport};
-use super::{Normals, Output, OutputKind, Plan, Stage, ZoneRate};
+use super::{Normals, Output, OutputKind, Plan, Stage, ZoneRate, turns};
 use serde::Serialize;
 
 /// Measured on one core of a shared x86-64 server (Zen 3, AVX2) by `make bench`; nanoseconds.
@@ -36,6 +36,9 @@ mod table {
     pub(super) const UNKNOWN: f64 = 6.0;
     /// One displacement of a particle along its track, walls and random numbers included.
     pub(super) const TRACK: f64 = 15.0;
+    /// One particle asked whether it reacts, and one reaction of it.
+    pub(super) const WAIT: f64 = 6.0;
+    pub(super) const TURN: f64 = 60.0;
     /// Sub-steps that a particle takes in a step of `step auto` in cells.
     pub(super) const SUB_STEPS: f64 = crate::plan::auto_step::CELLS_PER_STEP;
     /// One particle observed once: positions worked out again, species restored, sums.
@@ -139,6 +142,9 @@ fn track_cost(transport: &Transport) -> f64 {
 
 /// Nanoseconds per particle and step, with the sub-steps that are expected.
 fn react_cost(plan: &Plan, scales: Option<&TimeScales>) -> f64 {
+    if let Some(decay) = plan.transport.as_ref().and_then(|transport| transport.decay.as_ref()) {
+        return table::WAIT + table::TURN * turns::per_step(plan, decay);
+    }
     let Some(chemistry) = &plan.chemistry else { return 0.0 };
     let Some(kinetics) = &chemistry.kinetics else { return 0.0 };
     let n = plan.components.len() as f64;

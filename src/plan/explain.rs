@@ -114,9 +114,16 @@ fn stage_words(stage: Stage) -> &'static str {
 }
 
 fn step_lines(compiled: &Compiled) -> Vec<String> {
+    let is_of_masses = compiled.plan.transport.is_some();
+    let words = |stage: Stage| match stage {
+        Stage::React if is_of_masses => {
+            "react: particles become others on their way, each at a time of its own"
+        }
+        _ => stage_words(stage),
+    };
     let line = |(stage, cost): &(Stage, f64)| match stage {
-        Stage::Observe => stage_words(*stage).to_owned(),
-        _ => format!("{}   (about {cost:.1} ns per particle)", stage_words(*stage)),
+        Stage::Observe => words(*stage).to_owned(),
+        _ => format!("{}   (about {cost:.1} ns per particle)", words(*stage)),
     };
     compiled.cost.stages.iter().map(line).collect()
 }

@@ -5,11 +5,15 @@
 use super::chemistry::{
     Activity, Chemistry, Equilibrium, Integrator, Kinetic, Kinetics, Law, Method, Splitting,
 };
+use super::transport::{Decay, Turn};
 use super::{Component, Plan, Species};
 use crate::diagnostic::number;
 
 /// Lines of the section on reactions; none without chemistry.
 pub(super) fn lines(plan: &Plan) -> Vec<String> {
+    if let Some(decay) = plan.transport.as_ref().and_then(|transport| transport.decay.as_ref()) {
+        return decay_lines(plan, decay);
+    }
     let Some(chemistry) = &plan.chemistry else { return Vec::new() };
     let mut lines = Vec::new();
     if let Some(kinetics) = &chemistry.kinetics {
@@ -29,6 +33,35 @@ pub(super) fn lines(plan: &Plan) -> Vec<String> {
     }
     if let Some(equilibrium) = &chemistry.equilibrium {
         lines.extend(equilibrium_lines(plan, equilibrium));
+    }
+    lines
+}
+
+/// Reactions of particles that carry mass.
+fn decay_lines(plan: &Plan, decay: &Decay) -> Vec<String> {
+    let name = |population: usize| {
+        let species =
+            plan.transport.as_ref().and_then(|it| it.populations.get(population)).map(|it| it.species);
+        species.and_then(|idx| plan.species.get(idx)).map_or("?", |species| species.name.as_str())
+    };
+    let line = |turn: &Turn| {
+        let outcome = |&(to, chance): &(usize, f64)| {
+            let weight = decay.weights[to] / decay.weights[turn.population];
+            match chance * weight {
+                yields if (yields - 1.0).abs() < 1e-12 => name(to).to_owned(),
+                yields => format!("{} {}", number(yields), name(to)),
+            }
+        };
+        let outcomes: Vec<String> = turn.outcomes.iter().map(outcome).collect();
+        let becomes = if outcomes.is_empty() { "nothing".to_owned() } else { outcomes.join(" + ") };
+        format!("{}: {} becomes {becomes}, {} /s", turn.name, name(turn.population), number(turn.rate))
+    };
+    let mut lines: Vec<String> = decay.reactions.iter().map(line).collect();
+    lines.push("first order: waiting times of single particles, exact in law for any step".to_owned());
+    if decay.weights.iter().any(|weight| *weight != decay.weights[0]) {
+        lines.push(
+            "a reaction that makes more or less than it takes makes heavier or lighter particles".to_owned(),
+        );
     }
     lines
 }

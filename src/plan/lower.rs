@@ -3,6 +3,7 @@
 use super::build_tape::build_tape;
 use super::evaluation::{self, Evaluation};
 use super::lower_chemistry::{self, Network};
+use super::lower_decay;
 use super::lower_transport::{self, of_fluid};
 use super::{
     Axis, InstantReaction, Mixing, NUMERICS_VERSION, Normals, Output, OutputUnit, Particles, Plan, Quantity,
@@ -27,8 +28,9 @@ pub fn lower(scenario: &Scenario) -> Result<Lowered, Vec<Diagnostic>> {
     let bins = scenario.bins.as_ref().map_or_else(|| vec![1; n_axes], |bins| bins.value.clone());
     let axes: Vec<Axis> =
         scenario.domain.axes.iter().zip(bins).map(|(axis, bins)| lower_axis(axis, bins)).collect();
+    let decay = lower_decay::decay(scenario)?;
     let Network { species, components, chemistry, warnings } = lower_chemistry::network(scenario, &axes)?;
-    let transport = lower_transport::transport(scenario, &axes)?;
+    let transport = lower_transport::transport(scenario, &axes, decay)?;
     let extent: f64 = axes.iter().map(|axis| axis.high - axis.low).product();
     // A particle is a volume of water.
     let volume = extent * lower_transport::porosity_of_fluid(scenario);
@@ -81,7 +83,9 @@ fn only_masses(plan: &mut Plan) {
     plan.chemistry = None;
     plan.walk.drift.fill(0.0);
     plan.walk.spread.fill(0.0);
-    plan.stages = vec![Stage::Move, Stage::Observe];
+    let reacts = plan.transport.as_ref().is_some_and(|transport| transport.decay.is_some());
+    let stages = [Stage::React, Stage::Move, Stage::Observe];
+    plan.stages = stages.into_iter().filter(|stage| reacts || *stage != Stage::React).collect();
     let populations = plan.transport.iter().flat_map(|transport| &transport.populations);
     plan.particles.count = populations.fold(0, |sum: u64, it| sum.saturating_add(it.count)).max(1);
 }

@@ -370,7 +370,7 @@ fn kinetics(
 }
 
 /// What one unit of extent makes of each species.
-fn net(reaction: &scenario::Reaction) -> Vec<(usize, f64)> {
+pub(super) fn net(reaction: &scenario::Reaction) -> Vec<(usize, f64)> {
     let mut list: Vec<(usize, f64)> = Vec::new();
     let reactants = reaction.reactants.iter().map(|(species, nu)| (*species, -nu));
     for (species, nu) in reactants.chain(reaction.products.iter().copied()) {
@@ -384,7 +384,7 @@ fn net(reaction: &scenario::Reaction) -> Vec<(usize, f64)> {
 }
 
 /// `k Π c^ν` and, where k is a constant, what kind of law it is.
-fn mass_action(scenario: &Scenario, constant: &Expr, reactants: &[(usize, f64)]) -> (Law, Expr) {
+pub(super) fn mass_action(scenario: &Scenario, constant: &Expr, reactants: &[(usize, f64)]) -> (Law, Expr) {
     let span = constant.span;
     let plain = Type::Number(Dimension::NONE);
     let mut rate = constant.clone();

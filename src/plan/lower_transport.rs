@@ -9,8 +9,8 @@ use super::lower::too_large;
 use super::shares;
 use super::tape::{Binary, Operation, Tape};
 use super::transport::{
-    Conductivity, Darcy, DarcySide, Dispersion, Flow, Interface, Patch, Population, Region, SideRule, Source,
-    Strength, Transport, Well,
+    Conductivity, Darcy, DarcySide, Decay, Dispersion, Flow, Interface, Patch, Population, Region, SideRule,
+    Source, Strength, Transport, Well,
 };
 use crate::diagnostic::Diagnostic;
 use crate::scenario::expression::Expr;
@@ -19,12 +19,16 @@ use crate::scenario::{self, Scenario};
 use crate::source::Span;
 
 /// The transport of a scene with masses; `None` where today's walk of fluid says everything.
-pub(super) fn transport(scenario: &Scenario, axes: &[Axis]) -> Result<Option<Transport>, Vec<Diagnostic>> {
+pub(super) fn transport(
+    scenario: &Scenario,
+    axes: &[Axis],
+    decay: Option<Decay>,
+) -> Result<Option<Transport>, Vec<Diagnostic>> {
     if scenario.particles.shares.is_none() {
         return Ok(None);
     }
     let mut lowering = Lowering { scenario, axes, problems: Vec::new() };
-    let transport = lowering.transport();
+    let transport = lowering.transport(decay);
     match transport {
         Some(transport) if lowering.problems.is_empty() => Ok(Some(transport)),
         _ => Err(lowering.problems),
@@ -75,7 +79,7 @@ struct Lowering<'a> {
 }
 
 impl Lowering<'_> {
-    fn transport(&mut self) -> Option<Transport> {
+    fn transport(&mut self, decay: Option<Decay>) -> Option<Transport> {
         let flow = self.flow()?;
         let (dispersion, own) = self.dispersion()?;
         let porosity = match &self.scenario.medium {
@@ -93,7 +97,7 @@ impl Lowering<'_> {
             sides,
             sources,
             populations,
-            decay: None,
+            decay,
             sub_steps: None,
             interfaces,
         };

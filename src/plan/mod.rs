@@ -24,6 +24,7 @@ mod law;
 pub mod limits;
 mod lower;
 mod lower_chemistry;
+mod lower_decay;
 mod lower_transport;
 mod method;
 pub mod passes;
@@ -34,6 +35,7 @@ pub mod tape;
 pub mod time_scales;
 pub mod transport;
 mod transport_limits;
+mod turns;
 
 pub use crate::scenario::{OutputKind, Placement, Side, Station};
 pub use compile::{Compiled, Options, Selection, compile, hash};

@@ -7,7 +7,7 @@ use super::chemistry::{Method, Splitting};
 use super::integrator::Expected;
 use super::limits::{Limit, dispersion, short};
 use super::time_scales::TimeScales;
-use super::{Plan, ZoneRate};
+use super::{Plan, ZoneRate, turns};
 use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{N106, N107, N201};
 use crate::scenario::Scenario;
@@ -31,6 +31,14 @@ pub(super) fn check(
         particles_per_bin(scenario, plan, diagnostics);
     }
     noise_of_means(scenario, plan, limits, diagnostics);
+    if let Some(decay) = plan.transport.as_ref().and_then(|transport| transport.decay.as_ref()) {
+        limits.push(Limit {
+            name: "reactions of a particle per step".into(),
+            formula: "k dt on the mean over the run",
+            value: turns::per_step(plan, decay),
+            advice: "any: each is followed, so far above 1 a step takes longer and is no less right",
+        });
+    }
     let (Some(scales), Some(kinetics)) =
         (scales, plan.chemistry.as_ref().and_then(|chemistry| chemistry.kinetics.as_ref()))
     else {

@@ -87,8 +87,16 @@ const BUDGET: &[Number] = &[
         Rule::Value,
         "entered less left; what is there in row `inside`; in row `defect` that less all others",
     ),
-    number("entered", Rule::Value, "what came in since the start; null in rows `inside` and `defect`"),
-    number("left", Rule::Value, "what went out since the start; null in rows `inside` and `defect`"),
+    number(
+        "entered",
+        Rule::Value,
+        "what came in, or was made by a reaction, since the start; null in rows `inside` and `defect`",
+    ),
+    number(
+        "left",
+        Rule::Value,
+        "what went out, or was taken by a reaction, since the start; null in rows `inside` and `defect`",
+    ),
 ];
 
 impl OutputKind {
@@ -149,6 +157,8 @@ impl Plan {
         match (output.kind, &output.station) {
             (OutputKind::Budget, _) => {
                 let mut places = self.doors();
+                let decay = self.transport.iter().flat_map(|transport| &transport.decay);
+                places.extend(decay.flat_map(|decay| &decay.reactions).map(|turn| turn.name.clone()));
                 places.extend([INSIDE.to_owned(), DEFECT.to_owned()]);
                 places
             }

@@ -221,11 +221,33 @@ pub struct Population {
     pub initial: Tape,
 }
 
-/// First-order reactions: `dc/dt = M c`, 1/s, row by row over populations.
+/// First-order reactions of what particles carry: one becomes another, or is gone.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Decay {
-    pub rates: Vec<f64>,
+    pub reactions: Vec<Turn>,
+    /// Per population, what a particle weighs in it: one that comes from population `a` has the mass of its
+    /// origin times `weights[b] / weights[a]` in `b`.
+    pub weights: Vec<f64>,
+}
+
+/// A reaction of the particles of one population.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Turn {
+    pub name: String,
+    pub population: usize,
+    /// Chance per time of each particle, 1/s.
+    pub rate: f64,
+    /// What becomes of it, `(population, chance)`; it is gone with what is left to 1.
+    pub outcomes: Vec<(usize, f64)>,
+}
+
+impl Decay {
+    /// Populations that something becomes of.
+    pub fn reacts(&self, population: usize) -> bool {
+        self.reactions.iter().any(|turn| turn.population == population && turn.rate > 0.0)
+    }
 }
 
 /// Criteria for the steps of single particles.

@@ -25,6 +25,13 @@ pub enum Purpose {
     Release,
     /// Random conductivity.
     Conductivity,
+    /// When single particles react first in a displacement.
+    Wait,
+    /// What they become, and all that follows within it.
+    Turn,
+    /// Both on the way to a time between two steps.
+    BridgeWait,
+    BridgeTurn,
 }
 
 /// The generator of one purpose under one root seed.
@@ -45,6 +52,10 @@ impl Stream {
             Purpose::BridgeWall => "bridge wall",
             Purpose::Release => "release",
             Purpose::Conductivity => "conductivity",
+            Purpose::Wait => "wait",
+            Purpose::Turn => "turn",
+            Purpose::BridgeWait => "bridge wait",
+            Purpose::BridgeTurn => "bridge turn",
         };
         let mut hasher = blake3::Hasher::new();
         hasher.update(b"lamella random stream 1\0");
@@ -103,6 +114,24 @@ impl Stream {
         width.run(DrawEach { key: &self.key, particles, number: 2 * number, words: &mut high });
         width.run(DrawEach { key: &self.key, particles, number: 2 * number + 1, words: &mut low });
         normal::double(&high, &low, normals);
+    }
+
+    /// Eight uniform numbers in (0, 1) with 53 bits for each of 64 particles, a row of 64 per number.
+    pub fn uniforms_each(
+        &self,
+        width: Width,
+        particles: &[u64; LANES],
+        number: u64,
+        uniforms: &mut [[f64; LANES]; 8],
+    ) {
+        let mut words = [0; DRAW];
+        width.run(DrawEach { key: &self.key, particles, number, words: &mut words });
+        let (rows, _) = words.as_chunks::<LANES>();
+        for (row, pair) in uniforms.iter_mut().zip(rows.as_chunks::<2>().0) {
+            for (lane, uniform) in row.iter_mut().enumerate() {
+                *uniform = uniform_53(pair[0][lane], pair[1][lane]);
+            }
+        }
     }
 
     /// Eight uniform numbers in (0, 1) of one particle.

@@ -65,7 +65,7 @@ impl Knob {
         let equilibrium = plan.chemistry.as_ref().and_then(|chemistry| chemistry.equilibrium.as_ref());
         let is_moving = plan.walk.drift.iter().chain(&plan.walk.spread).any(|entry| *entry != 0.0);
         match self {
-            Self::Rates => kinetics.is_some(),
+            Self::Rates => kinetics.is_some() || plan.transport.iter().any(|it| it.decay.is_some()),
             Self::Concentrations => !plan.components.is_empty(),
             Self::HalfSaturation => {
                 kinetics.is_some_and(|kinetics| !half_saturations(&kinetics.laws.operations).is_empty())
@@ -133,6 +133,10 @@ fn multiply_initial(component: &mut Component, factor: f64) {
 }
 
 fn multiply_rates(plan: &mut Plan, factor: f64) {
+    let decay = plan.transport.iter_mut().flat_map(|transport| &mut transport.decay);
+    for turn in decay.flat_map(|decay| &mut decay.reactions) {
+        turn.rate = (turn.rate * factor).min(f64::MAX);
+    }
     let Some(kinetics) = plan.chemistry.as_mut().and_then(|chemistry| chemistry.kinetics.as_mut()) else {
         return;
     };

@@ -35,7 +35,7 @@ impl<const D: usize, M: Medium<D>> Run<'_, D, M> {
                 what,
                 population: birth.population,
                 id: birth.id,
-                mass: self.units[origin],
+                mass: self.units.of(birth.population, birth.id),
                 t: t + birth.entered.max(EARLIEST) * dt,
             };
             let mut events = vec![event(What::Entered { origin })];
@@ -66,7 +66,7 @@ impl<const D: usize, M: Medium<D>> Run<'_, D, M> {
                     let (id, position) = (flock.ids[idx], flock.position(idx));
                     if inside(position) {
                         let what = What::Replaced { origin: release.origin };
-                        let mass = self.units[flock::origin(id)];
+                        let mass = self.units.of(flock.population, id);
                         events.push(Event { what, population: flock.population, id, mass, t });
                         continue;
                     }

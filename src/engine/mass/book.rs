@@ -3,10 +3,13 @@
 //! Owns the books of a run. May use the tracker's words. It deliberately keeps no particle and sums no mass:
 //! it counts particles of equal mass, so that nothing is rounded.
 
+use super::super::track::fates::Way;
 use super::super::track::monitors::Crossing;
 use super::super::track::tracker::Events;
+use super::super::track::turning::Turns;
 use super::super::track::walls::Exit;
 use super::flock;
+use super::units::Units;
 
 /// What can happen to a particle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,17 +43,20 @@ pub struct Event {
     pub t: f64,
 }
 
-/// Events of one population while a group moves.
+/// Events of a group while it moves.
 pub struct Log<'a> {
+    /// What those are that something happens to.
     pub population: usize,
-    /// Mass of a particle by origin.
-    pub units: &'a [f64],
+    pub units: &'a Units,
     pub events: &'a mut Vec<Event>,
+    /// Per way and origin what has turned; empty as long as nothing has.
+    pub turned: &'a mut Vec<u64>,
+    pub n_ways: usize,
 }
 
 impl Log<'_> {
     fn note(&mut self, id: u64, what: What, t: f64) {
-        let mass = self.units[flock::origin(id)];
+        let mass = self.units.of(self.population, id);
         self.events.push(Event { what, population: self.population, id, mass, t });
     }
 }
@@ -65,11 +71,24 @@ impl Events for Log<'_> {
     }
 }
 
+impl Turns for Log<'_> {
+    fn is_now(&mut self, population: usize) {
+        self.population = population;
+    }
+
+    fn turned(&mut self, id: u64, way: usize) {
+        let n = self.units.n_origins();
+        if self.turned.is_empty() {
+            self.turned.resize(self.n_ways * n, 0);
+        }
+        self.turned[way * n + flock::origin(id)] += 1;
+    }
+}
+
 /// The books of all populations: numbers of particles by where they are from and what they came through.
 #[derive(Debug, Clone)]
 pub struct Book {
-    /// Mass of a particle by origin.
-    units: Vec<f64>,
+    units: Units,
     /// The door of an origin: 0 is the start, then sources, then sides.
     doors: Vec<usize>,
     n_doors: usize,
@@ -77,23 +96,35 @@ pub struct Book {
     entered: Vec<u64>,
     /// Per population, door and origin.
     left: Vec<u64>,
+    /// What turns into what.
+    ways: Vec<Way>,
+    /// Per way and origin.
+    turned: Vec<u64>,
 }
 
 impl Book {
     /// `doors` by origin; sides, and wells behind them, are the last `n_sides` of all doors.
-    pub fn new(units: Vec<f64>, doors: Vec<usize>, n_doors: usize, n_populations: usize) -> Self {
-        let n = units.len();
+    pub fn new(
+        units: Units,
+        doors: Vec<usize>,
+        n_doors: usize,
+        n_populations: usize,
+        ways: Vec<Way>,
+    ) -> Self {
+        let n = units.n_origins();
         Self {
             units,
             doors,
             n_doors,
             entered: vec![0; n_populations * n],
             left: vec![0; n_populations * n_doors * n],
+            turned: vec![0; ways.len() * n],
+            ways,
         }
     }
 
     pub fn note(&mut self, event: &Event, n_sides: usize) {
-        let n = self.units.len();
+        let n = self.units.n_origins();
         let origin = flock::origin(event.id);
         let door = match event.what {
             What::Entered { .. } => {
@@ -107,33 +138,59 @@ impl Book {
         self.left[(event.population * self.n_doors + door) * n + origin] += 1;
     }
 
+    /// Adds what has turned, per way and origin.
+    pub fn turn(&mut self, counts: &[u64]) {
+        self.turned.iter_mut().zip(counts).for_each(|(sum, n)| *sum += n);
+    }
+
     pub fn n_doors(&self) -> usize {
         self.n_doors
     }
 
-    /// Mass of so many particles of each origin.
-    pub fn mass(&self, counts: &[u64]) -> f64 {
-        counts.iter().zip(&self.units).map(|(&n, unit)| n as f64 * unit).sum()
-    }
-
     /// What came through a door since the start.
     pub fn entered(&self, population: usize, door: usize) -> f64 {
-        let n = self.units.len();
+        let n = self.units.n_origins();
         let counts = self.entered[population * n..][..n].iter().zip(&self.doors);
         let own: Vec<u64> = counts.map(|(&n, &other)| if other == door { n } else { 0 }).collect();
-        self.mass(&own)
+        self.units.sum(population, &own)
     }
 
     /// What went through a door since the start.
     pub fn left(&self, population: usize, door: usize) -> f64 {
-        let n = self.units.len();
-        self.mass(&self.left[(population * self.n_doors + door) * n..][..n])
+        let n = self.units.n_origins();
+        self.units.sum(population, &self.left[(population * self.n_doors + door) * n..][..n])
     }
 
-    /// Everything that came, and everything that went.
+    /// What a reaction made of a population since the start, and what it took.
+    pub fn turned(&self, population: usize, reaction: usize) -> (f64, f64) {
+        let n = self.units.n_origins();
+        let (mut made, mut taken) = (0.0, 0.0);
+        for (idx, way) in self.ways.iter().enumerate().filter(|(_, way)| way.reaction == reaction) {
+            let counts = &self.turned[idx * n..][..n];
+            if way.to == Some(population) {
+                made += self.units.sum(population, counts);
+            }
+            if way.from == population {
+                taken += self.units.sum(population, counts);
+            }
+        }
+        (made, taken)
+    }
+
+    pub fn n_reactions(&self) -> usize {
+        self.ways.iter().map(|way| way.reaction + 1).max().unwrap_or(0)
+    }
+
+    /// Everything that came or was made, and everything that went or was taken.
     pub fn whole(&self, population: usize) -> (f64, f64) {
         let doors = 0..self.n_doors;
-        let entered = doors.clone().map(|door| self.entered(population, door)).sum();
-        (entered, doors.map(|door| self.left(population, door)).sum())
+        let mut entered: f64 = doors.clone().map(|door| self.entered(population, door)).sum();
+        let mut left: f64 = doors.map(|door| self.left(population, door)).sum();
+        for reaction in 0..self.n_reactions() {
+            let (made, taken) = self.turned(population, reaction);
+            entered += made;
+            left += taken;
+        }
+        (entered, left)
     }
 }

@@ -78,6 +78,39 @@ impl Entry {
         }
         0.5 * (low + high)
     }
+
+    /// Concentration at a depth.
+    ///
+    /// - Equation: `c = ½ [erfc((y − vt)/s) + e^{vy/D} erfc((y + vt)/s)]`.
+    /// - Symbols: as in [`Entry::beyond`].
+    /// - Range: any velocity.
+    /// - Source: Ogata and Banks (1961), doi:10.3133/pp411A.
+    /// - Shape: one depth.
+    fn profile(self, y: f64) -> f64 {
+        let (s, a) = (self.length(), self.travelled());
+        if s <= 1e-9 * a.abs() || s == 0.0 {
+            return if y <= a { 1.0 } else { 0.0 };
+        }
+        0.5 * (erfc((y - a) / s) + exp_erfc(self.velocity * y / self.dispersion, (y + a) / s))
+    }
+
+    /// How long what is found at a depth has been there, s.
+    ///
+    /// - Equation: `P(age < a) = c(y, a)/c(y, t)`.
+    /// - Symbols: `c` as in [`Entry::profile`], `t` the time of the entry.
+    /// - Range: depths that something has reached.
+    /// - Source: `c(y, a)` is the chance that a walk from `y` against the flow meets the edge within `a`; backwards in
+    ///   time it is the way of what came in last.
+    /// - Shape: one particle, by bisection.
+    pub fn age(self, y: f64, uniform: f64) -> f64 {
+        let wanted = uniform * self.profile(y);
+        let (mut low, mut high) = (0.0, self.time);
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            if (Self { time: middle, ..self }).profile(y) < wanted { low = middle } else { high = middle }
+        }
+        high
+    }
 }
 
 /// `e^a erfc(b)` where either alone may be beyond numbers.
@@ -90,12 +123,6 @@ mod tests {
     use super::*;
     use crate::maths::quadrature::integrate;
 
-    /// The profile of Ogata and Banks as it is printed.
-    fn profile(entry: Entry, x: f64) -> f64 {
-        let (s, a) = (entry.length(), entry.travelled());
-        0.5 * (erfc((x - a) / s) + exp_erfc(entry.velocity * x / entry.dispersion, (x + a) / s))
-    }
-
     /// Reference: the profile, integrated numerically.
     #[test]
     fn integrals_are_those_of_the_profile() {
@@ -104,7 +131,7 @@ mod tests {
             let deepest = entry.travelled().max(0.0) + 8.0 * entry.length();
             for x in [0.0, 0.1, 0.5, 2.0] {
                 let expected =
-                    integrate(|y| profile(entry, y), &[x, deepest.max(x + 1.0)], 1e-13, 1e-12).value;
+                    integrate(|y| entry.profile(y), &[x, deepest.max(x + 1.0)], 1e-13, 1e-12).value;
                 let found = entry.beyond(x);
                 // Near v = 0 the flow is left out: half of a step's Péclet number at most.
                 let error = (found - expected).abs();

@@ -78,6 +78,25 @@ pub fn add<const D: usize>(flocks: &mut Vec<Flock<D>>, population: usize, id: u6
     }
 }
 
+/// Adds particles of any population to flocks that have room, and to new ones.
+pub fn spread<const D: usize>(flocks: &mut Vec<Flock<D>>, mut list: Vec<(usize, u64, [f64; D])>) {
+    list.sort_by_key(|(population, ..)| *population);
+    let mut rest = &list[..];
+    while let Some(&(population, ..)) = rest.first() {
+        let n = rest.iter().take_while(|(other, ..)| *other == population).count();
+        let (own, others) = rest.split_at(n);
+        rest = others;
+        let mut particles = own.iter();
+        for flock in flocks.iter_mut().filter(|flock| flock.population == population) {
+            let room = BLOCK - flock.len().min(BLOCK);
+            particles.by_ref().take(room).for_each(|&(_, id, position)| flock.push(id, position));
+        }
+        for &(_, id, position) in particles {
+            add(flocks, population, id, position);
+        }
+    }
+}
+
 /// Fills flocks up again when they are half empty on the whole.
 pub fn gather<const D: usize>(flocks: &mut Vec<Flock<D>>) {
     flocks.retain(|flock| flock.len() > 0);

@@ -8,21 +8,33 @@ use super::super::parallel;
 use super::super::track::lanes::{LANES, Lane};
 use super::super::track::medium::{Carrier, Medium};
 use super::super::track::tracker::{Bench, Steps, TooManySubSteps, Tracker};
+use super::super::track::turning::{Company, Newborn};
 use super::book::{Event, Log};
 use super::flock::{self, Flock};
 use super::release::Birth;
 use super::run::Run;
+use super::turn::{OnTurning, Pass, go_on_turning};
+use super::units::Units;
 
 /// What came of a group of blocks.
-#[derive(Default)]
-struct Yield {
-    events: Vec<Event>,
-    trouble: Option<Trouble>,
-    displacements: u64,
+pub struct Yield<const D: usize> {
+    pub events: Vec<Event>,
+    /// Per way and origin what has turned; empty if nothing has.
+    pub turned: Vec<u64>,
+    /// What is of another population now.
+    pub moved: Vec<(usize, u64, [f64; D])>,
+    pub trouble: Option<Trouble>,
+    pub displacements: u64,
+}
+
+impl<const D: usize> Default for Yield<D> {
+    fn default() -> Self {
+        Self { events: Vec::new(), turned: Vec::new(), moved: Vec::new(), trouble: None, displacements: 0 }
+    }
 }
 
 #[derive(Debug, Clone, Copy)]
-enum Trouble {
+pub enum Trouble {
     SubSteps(TooManySubSteps),
     Position { id: u64, step: u64 },
 }
@@ -30,26 +42,42 @@ enum Trouble {
 impl<const D: usize, M: Medium<D>> Run<'_, D, M> {
     pub fn move_flocks(&mut self, steps: Steps) -> Result<(), RunError> {
         let (tracker, carriers, units, benches) = (&self.tracker, &self.carriers, &self.units, &self.benches);
-        let mut tasks: Vec<(&mut Flock<D>, Yield)> =
+        let company = self.chain.as_ref().map(|chain| Company { chain, carriers: &self.paces });
+        let mut tasks: Vec<(&mut Flock<D>, Yield<D>)> =
             self.flocks.iter_mut().map(|flock| (flock, Yield::default())).collect();
         parallel::for_each(&mut tasks, &|_, (flock, found)| {
-            if carriers[flock.population].mobility == 0.0 {
+            let turning = company.filter(|company| company.chain.turns(flock.population));
+            if turning.is_none() && carriers[flock.population].mobility == 0.0 {
                 return;
             }
             benches.lend(
                 || Box::new(tracker.bench()),
-                |bench| {
-                    let carrier = &carriers[flock.population];
-                    tracker.width.run(OnFlock { tracker, carrier, units, steps, flock, bench, found });
+                |bench| match turning {
+                    Some(company) => {
+                        let newborn = None;
+                        let pass = Pass { tracker, company, units, steps, newborn };
+                        tracker.width.run(OnTurning { pass, flock, bench, found });
+                    }
+                    None => {
+                        let carrier = &carriers[flock.population];
+                        tracker.width.run(OnFlock { tracker, carrier, units, steps, flock, bench, found });
+                    }
                 },
             );
         });
-        let found: Vec<Yield> = tasks.into_iter().map(|(_, found)| found).collect();
-        found.into_iter().try_for_each(|found| self.take(found))
+        let found: Vec<Yield<D>> = tasks.into_iter().map(|(_, found)| found).collect();
+        let mut moved = Vec::new();
+        for mut found in found {
+            moved.append(&mut found.moved);
+            self.take(found)?;
+        }
+        flock::spread(&mut self.flocks, moved);
+        Ok(())
     }
 
-    fn take(&mut self, found: Yield) -> Result<(), RunError> {
+    fn take(&mut self, found: Yield<D>) -> Result<(), RunError> {
         self.note(&found.events);
+        self.book.turn(&found.turned);
         self.displacements += found.displacements;
         match found.trouble {
             None => Ok(()),
@@ -70,28 +98,48 @@ impl<const D: usize, M: Medium<D>> Run<'_, D, M> {
             let n = rest.iter().take(LANES).take_while(|birth| birth.population == first.population).count();
             let (group, others) = rest.split_at(n);
             rest = others;
-            let mut flock = Flock::new(first.population);
-            let mut entered: Lane = [0.0; LANES];
-            for (lane, birth) in group.iter().enumerate() {
-                flock.push(birth.id, birth.position);
-                entered[lane] = birth.entered;
-            }
-            let carrier = self.carriers[flock.population];
-            let mut found = Yield::default();
-            if carrier.mobility > 0.0 {
-                let (tracker, units) = (&self.tracker, &self.units);
-                self.benches.lend(
-                    || Box::new(tracker.bench()),
-                    |bench| {
-                        go_on(tracker, &carrier, units, steps, Some(&entered), &mut flock, bench, &mut found)
-                    },
-                );
-            }
-            self.take(found)?;
-            for idx in 0..flock.len() {
-                flock::add(&mut self.flocks, flock.population, flock.ids[idx], flock.position(idx));
+            self.move_group(group, steps)?;
+        }
+        Ok(())
+    }
+
+    /// Takes up to 64 newborn particles of one population along.
+    fn move_group(&mut self, group: &[Birth<D>], steps: Steps) -> Result<(), RunError> {
+        let mut flock = Flock::new(group[0].population);
+        let turning = self.chain.as_ref().filter(|chain| chain.turns(flock.population));
+        let (mut entered, mut ages): (Lane, Lane) = ([0.0; LANES], [0.0; LANES]);
+        for (lane, birth) in group.iter().enumerate() {
+            flock.push(birth.id, birth.position);
+            entered[lane] = birth.entered;
+            if turning.is_some() {
+                ages[lane] = self.releases[flock::origin(birth.id)].age(&self.stream, birth, steps.dt);
             }
         }
+        let carrier = self.carriers[flock.population];
+        let mut found = Yield::default();
+        let (tracker, units) = (&self.tracker, &self.units);
+        if turning.is_some() || carrier.mobility > 0.0 {
+            self.benches.lend(
+                || Box::new(tracker.bench()),
+                |bench| match turning {
+                    Some(chain) => {
+                        let company = Company { chain, carriers: &self.paces };
+                        let newborn = Some(Newborn { entered: &entered, ages: &ages });
+                        let pass = Pass { tracker, company, units, steps, newborn };
+                        go_on_turning(&pass, &mut flock, bench, &mut found);
+                    }
+                    None => {
+                        go_on(tracker, &carrier, units, steps, Some(&entered), &mut flock, bench, &mut found);
+                    }
+                },
+            );
+        }
+        let moved = std::mem::take(&mut found.moved);
+        self.take(found)?;
+        for idx in 0..flock.len() {
+            flock::add(&mut self.flocks, flock.population, flock.ids[idx], flock.position(idx));
+        }
+        flock::spread(&mut self.flocks, moved);
         Ok(())
     }
 }
@@ -100,11 +148,11 @@ impl<const D: usize, M: Medium<D>> Run<'_, D, M> {
 struct OnFlock<'a, const D: usize, M: Medium<D>> {
     tracker: &'a Tracker<D, M>,
     carrier: &'a Carrier,
-    units: &'a [f64],
+    units: &'a Units,
     steps: Steps,
     flock: &'a mut Flock<D>,
     bench: &'a mut Bench<D, M>,
-    found: &'a mut Yield,
+    found: &'a mut Yield<D>,
 }
 
 impl<const D: usize, M: Medium<D>> pulp::NullaryFnOnce for OnFlock<'_, D, M> {
@@ -122,12 +170,12 @@ impl<const D: usize, M: Medium<D>> pulp::NullaryFnOnce for OnFlock<'_, D, M> {
 fn go_on<const D: usize, M: Medium<D>>(
     tracker: &Tracker<D, M>,
     carrier: &Carrier,
-    units: &[f64],
+    units: &Units,
     steps: Steps,
     entered: Option<&Lane>,
     flock: &mut Flock<D>,
     bench: &mut Bench<D, M>,
-    found: &mut Yield,
+    found: &mut Yield<D>,
 ) {
     let n = flock.len();
     let mut kept = 0;
@@ -135,7 +183,8 @@ fn go_on<const D: usize, M: Medium<D>>(
     for first in (0..n).step_by(LANES) {
         let range = first..(first + LANES).min(n);
         bench.lanes.load(&flock.ids[range.clone()], flock.positions.each_ref().map(|x| &x[range.clone()]));
-        let mut log = Log { population: flock.population, units, events: &mut found.events };
+        let (events, turned) = (&mut found.events, &mut found.turned);
+        let mut log = Log { population: flock.population, units, events, turned, n_ways: 0 };
         if let Err(problem) = tracker.advance(carrier, steps, entered, bench, &mut log) {
             found.trouble.get_or_insert(Trouble::SubSteps(problem));
         }

@@ -20,6 +20,8 @@ mod run;
 mod shape;
 mod sides;
 mod sources;
+mod turn;
+mod units;
 mod water;
 mod wells;
 mod world;

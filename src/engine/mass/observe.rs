@@ -10,6 +10,7 @@ use super::super::snapshot::{Row, Snapshot, Values};
 use super::book::Book;
 use super::flock::{self, Flock};
 use super::gate;
+use super::units::Units;
 use super::world::Site;
 use crate::maths::exact::{MOST_TERMS, Quanta, Sum};
 use crate::plan::{Output, OutputKind, Station};
@@ -20,7 +21,7 @@ use crate::state::particles::CHUNK;
 pub struct Scene<'a, const D: usize> {
     pub site: &'a Site<'a, D>,
     pub flocks: &'a [Flock<D>],
-    pub units: &'a [f64],
+    pub units: &'a Units,
     pub quanta: Quanta,
     pub book: &'a Book,
 }
@@ -90,8 +91,9 @@ impl<const D: usize> Scene<'_, D> {
         let n_groups = flocks.len().clamp(1, 16);
         let per_group = flocks.len().div_ceil(n_groups).max(1);
         let groups: Vec<&[&Flock<D>]> = flocks.chunks(per_group).collect();
-        let largest = self.units.iter().fold(0.0, |a: f64, &b| a.max(b));
+        let largest = self.units.largest();
         let square = Quanta::new(largest * largest, MOST_TERMS);
+        let units = self.units.row(population);
         let partial = parallel::map(groups.len(), &|group| {
             let mut cells = vec![Cell::default(); grid.n_slots()];
             let mut slots = [0_i32; CHUNK];
@@ -101,7 +103,7 @@ impl<const D: usize> Scene<'_, D> {
                     let positions = flock.positions.each_ref().map(|axis| &axis[range.clone()]);
                     grid.locate(positions, &mut slots[..range.len()]);
                     for (slot, &id) in slots.iter().zip(&flock.ids[range]) {
-                        let mass = self.units[flock::origin(id)];
+                        let mass = units[flock::origin(id)];
                         let cell = &mut cells[*slot as usize];
                         self.quanta.add(&mut cell.mass, mass);
                         square.add(&mut cell.square, mass * mass);
@@ -128,11 +130,11 @@ impl<const D: usize> Scene<'_, D> {
 
     /// Mass of a population that is there.
     pub fn inside(&self, population: usize) -> f64 {
-        let mut counts = vec![0_u64; self.units.len()];
+        let mut counts = vec![0_u64; self.units.n_origins()];
         for flock in self.flocks.iter().filter(|flock| flock.population == population) {
             flock.ids.iter().for_each(|&id| counts[flock::origin(id)] += 1);
         }
-        self.book.mass(&counts)
+        self.units.sum(population, &counts)
     }
 
     /// Positions in the order of numbers; the mass stands in the column of the particle's species.
@@ -151,8 +153,8 @@ impl<const D: usize> Scene<'_, D> {
         let column = |population: &Option<usize>| {
             list.iter()
                 .map(|&(id, flock, _)| {
-                    let is_own = Some(self.flocks[flock].population) == *population;
-                    if is_own { self.units[flock::origin(id)] } else { 0.0 }
+                    let own = self.flocks[flock].population;
+                    if Some(own) == *population { self.units.of(own, id) } else { 0.0 }
                 })
                 .collect()
         };

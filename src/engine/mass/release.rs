@@ -123,6 +123,19 @@ impl<const D: usize> Release<D> {
     }
 }
 
+impl<const D: usize> Release<D> {
+    /// How long a particle of its own has been in there before it is seen, at the end of a step of `dt`, s.
+    pub fn age(&self, stream: &Stream, birth: &Birth<D>, dt: f64) -> f64 {
+        let Kind::Held { entry, axis, .. } = &self.kind else { return 0.0 };
+        let side = match &self.place {
+            Place::Box(low, _) => low[*axis],
+            _ => return 0.0,
+        };
+        let depth = (birth.position[*axis] - side).abs();
+        Entry { time: dt, ..*entry }.age(depth, stream.uniforms_of(birth.id, 0)[7])
+    }
+}
+
 impl Sampling {
     /// Share of the mass that comes before a particle.
     fn share(self, count: u64, n: u64, uniforms: &[f64; 8]) -> f64 {

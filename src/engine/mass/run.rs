@@ -9,6 +9,7 @@ use super::super::error::RunError;
 use super::super::parallel::Pool;
 use super::super::schedule::{Due, schedule, step_length};
 use super::super::snapshot::{Outcome, Snapshot};
+use super::super::track::fates::Chain;
 use super::super::track::medium::{Carrier, Medium};
 use super::super::track::monitors::Plane;
 use super::super::track::noise::Draws;
@@ -19,6 +20,7 @@ use super::flock::{self, Flock};
 use super::gate::Gates;
 use super::observe::Scene;
 use super::release::{Birth, Kind, Release, Window};
+use super::units::Units;
 use super::world::Site;
 use crate::chemistry::Work;
 use crate::maths::exact::{MOST_TERMS, Quanta};
@@ -35,9 +37,13 @@ pub type Sink<'a> = &'a mut (dyn FnMut(Snapshot) -> Result<(), RunError> + Send)
 pub struct Run<'a, const D: usize, M: Medium<D>> {
     pub site: &'a Site<'a, D>,
     pub tracker: Tracker<D, M>,
+    /// What particles become on their way, if anything.
+    pub chain: Option<Chain>,
+    /// Carriers of what turns, one per kind of dispersion.
+    pub paces: Vec<Carrier>,
     pub carriers: Vec<Carrier>,
     pub releases: Vec<Release<D>>,
-    pub units: Vec<f64>,
+    pub units: Units,
     pub stream: Stream,
     pub flocks: Vec<Flock<D>>,
     pub book: Book,
@@ -113,16 +119,24 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
         let water = |station: &Station| site.water(&tracker.medium, station);
         let gates = Gates::new(site.plan, dues, &mut planes, period, water);
         tracker.planes = planes;
+        let chain =
+            site.transport.decay.as_ref().map(|decay| Chain::new(decay, &site.carriers(), site.plan.seed));
         let releases = site.releases(&tracker)?;
-        let units: Vec<f64> = releases.iter().map(|release| release.unit).collect();
-        let largest = units.iter().fold(0.0, |a: f64, &b| a.max(b));
+        let n_populations = site.transport.populations.len();
+        let units = Units::new(&releases, n_populations, site.transport.decay.as_ref());
         let doors = releases.iter().map(|release| release.door).collect();
         let n_doors = 1 + site.transport.sources.len() + 2 * D + site.transport.drains().len();
         Ok(Self {
             carriers: site.carriers(),
-            book: Book::new(units.clone(), doors, n_doors, site.transport.populations.len()),
+            book: Book::new(
+                units.clone(),
+                doors,
+                n_doors,
+                n_populations,
+                chain.as_ref().map_or_else(Vec::new, Chain::ways),
+            ),
             // Particles that are refilled count again and again; sums are over what happened, too.
-            quanta: Quanta::new(largest, MOST_TERMS),
+            quanta: Quanta::new(units.largest(), MOST_TERMS),
             gates,
             stream: Stream::new(site.plan.seed, Purpose::Release),
             flocks: Vec::new(),
@@ -130,6 +144,8 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
             displacements: 0,
             site,
             tracker,
+            paces: chain.as_ref().map_or_else(Vec::new, |chain| chain.carriers(&site.carriers())),
+            chain,
             releases,
             units,
         })
@@ -213,6 +229,8 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
         let draws = std::mem::replace(&mut self.tracker.draws, aside);
         let planes = std::mem::take(&mut self.tracker.planes);
         let gates = std::mem::take(&mut self.gates);
+        let chain = self.chain.clone();
+        self.chain = chain.as_ref().map(|chain| chain.aside(plan.seed));
         let (flocks, book, displacements) = (self.flocks.clone(), self.book.clone(), self.displacements);
         let steps = Steps {
             first: due.steps,
@@ -223,6 +241,7 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
         let found = self.advance(steps).and_then(|()| self.look(due));
         (self.flocks, self.book, self.displacements) = (flocks, book, displacements);
         (self.tracker.draws, self.tracker.planes, self.gates) = (draws, planes, gates);
+        self.chain = chain;
         found
     }
 
@@ -231,7 +250,7 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
         due.outputs.iter().map(|&output_idx| scene.observe(output_idx, due.t)).collect()
     }
 
-    /// Per population |inside + left − entered| / entered.
+    /// Per population |inside + left − entered| / entered, with what reactions take and make.
     fn defects(&self) -> Vec<f64> {
         let scene = self.scene();
         let defect = |population: usize| {

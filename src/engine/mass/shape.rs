@@ -27,11 +27,12 @@ impl<const D: usize> Scene<'_, D> {
         let flocks: Vec<&Flock<D>> =
             self.flocks.iter().filter(|flock| flock.population == population).collect();
         let groups: Vec<&[&Flock<D>]> = flocks.chunks(flocks.len().div_ceil(16).max(1)).collect();
+        let units = self.units.row(population);
         let partial = parallel::map(groups.len(), &|group| {
             let mut sum = zero.clone();
             for flock in groups[group] {
                 for (idx, &id) in flock.ids.iter().enumerate() {
-                    add(&mut sum, self.units[flock::origin(id)], flock.position(idx));
+                    add(&mut sum, units[flock::origin(id)], flock.position(idx));
                 }
             }
             sum
@@ -42,7 +43,7 @@ impl<const D: usize> Scene<'_, D> {
     }
 
     fn largest(&self) -> f64 {
-        self.units.iter().fold(0.0, |a: f64, &b| a.max(b))
+        self.units.largest()
     }
 
     /// Centre, then central moments around it, both by exact sums.
@@ -145,7 +146,7 @@ impl<const D: usize> Scene<'_, D> {
         Row { place: 0, numbers: vec![concentration, f64::NAN, f64::NAN, n as f64] }
     }
 
-    /// What came and went by each door, what is there, and what is missing.
+    /// What came and went by each door and reaction, what is there, and what is missing.
     pub fn budget(&self, population: Option<usize>) -> Vec<Row> {
         let n_doors = self.book.n_doors();
         let row = |place: usize, numbers: Vec<f64>| Row { place: place as u16, numbers };
@@ -157,9 +158,16 @@ impl<const D: usize> Scene<'_, D> {
             whole += entered - left;
             rows.push(row(door, vec![entered - left, entered, left]));
         }
+        let n_reactions = self.book.n_reactions();
+        for reaction in 0..n_reactions {
+            let (made, taken) = population.map_or((0.0, 0.0), |own| self.book.turned(own, reaction));
+            whole += made - taken;
+            rows.push(row(n_doors + reaction, vec![made - taken, made, taken]));
+        }
         let inside = population.map_or(0.0, |population| self.inside(population));
-        rows.push(row(n_doors, vec![inside, f64::NAN, f64::NAN]));
-        rows.push(row(n_doors + 1, vec![inside - whole, f64::NAN, f64::NAN]));
+        let last = n_doors + n_reactions;
+        rows.push(row(last, vec![inside, f64::NAN, f64::NAN]));
+        rows.push(row(last + 1, vec![inside - whole, f64::NAN, f64::NAN]));
         rows
     }
 

@@ -7,6 +7,7 @@
 pub mod cells;
 pub mod drains;
 pub mod duals;
+pub mod fates;
 pub mod formula;
 pub mod interfaces;
 pub mod lanes;
@@ -14,5 +15,6 @@ pub mod medium;
 pub mod monitors;
 pub mod noise;
 pub mod tracker;
+pub mod turning;
 pub mod uniform;
 pub mod walls;

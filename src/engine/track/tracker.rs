@@ -9,6 +9,7 @@ use super::lanes::{LANES, Lane, Lanes};
 use super::medium::{Carrier, Criteria, Leap, Medium};
 use super::monitors::{Crossing, Plane};
 use super::noise::{Draws, Normals};
+use super::turning::Fates;
 use super::walls::{Ends, Exit, Stride};
 use crate::maths::wide::Width;
 
@@ -56,10 +57,12 @@ pub trait Events {
 /// What one thread needs for a group.
 pub struct Bench<const D: usize, M: Medium<D>> {
     pub lanes: Lanes<D>,
-    normals: Box<Normals>,
-    look: M::Look,
-    leap: Leap,
+    pub(super) normals: Box<Normals>,
+    pub(super) look: M::Look,
+    pub(super) leap: Leap,
     exits: Vec<Exit>,
+    /// What becomes of the group, if it turns.
+    pub fates: Option<Box<Fates>>,
     /// Displacements done, one per particle.
     pub displacements: u64,
 }
@@ -79,6 +82,7 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
             look: self.medium.blank(),
             leap: Leap::new(1.0),
             exits: Vec::new(),
+            fates: None,
             displacements: 0,
         }
     }
@@ -173,7 +177,7 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
     /// One displacement of all lanes from `start` on, over the times of the leap. Nothing happens before
     /// `earliest`.
     #[inline(always)]
-    fn displace(
+    pub(super) fn displace(
         &self,
         carrier: &Carrier,
         number: u64,

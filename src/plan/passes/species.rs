@@ -3,7 +3,7 @@
 use super::{Draft, network};
 use crate::plan::evaluation::{Field, Scalar};
 use crate::plan::transport::{SideRule, Transport};
-use crate::plan::{Plan, Quantity};
+use crate::plan::{Plan, Quantity, Stage};
 
 pub(super) fn run(draft: &mut Draft) {
     let is_read = read_species(&draft.plan);
@@ -32,6 +32,12 @@ pub(super) fn run(draft: &mut Draft) {
         draft.leave_out("reactions at rates and in equilibrium", "no output reads any of their species");
     }
     remove(draft, &is_read);
+    let Some(transport) = &mut draft.plan.transport else { return };
+    if transport.decay.as_ref().is_some_and(|decay| decay.reactions.is_empty()) {
+        transport.decay = None;
+        draft.plan.stages.retain(|stage| *stage != Stage::React);
+        draft.leave_out("reactions", "no output reads any of their species");
+    }
 }
 
 /// Species that outputs name, the reactants of every instant reaction that touches one of these, and
@@ -56,6 +62,10 @@ fn read_species(plan: &Plan) -> Vec<bool> {
             if touches {
                 reaction.reactants.iter().for_each(|(species, _)| is_read[*species] = true);
             }
+        }
+        for turn in plan.transport.iter().flat_map(|it| &it.decay).flat_map(|decay| &decay.reactions) {
+            // Of what is read one must know what it comes from, not what it becomes.
+            is_read[turn.population] |= turn.outcomes.iter().any(|(to, _)| is_read[*to]);
         }
         if (0..is_read.len()).any(|species| is_read[species] && chemical[species]) {
             is_read.iter_mut().zip(&chemical).for_each(|(is_read, chemical)| *is_read |= chemical);
@@ -115,8 +125,19 @@ pub(super) fn remove(draft: &mut Draft, is_read: &[bool]) {
     renumber_evaluation(draft, &renumbered, &quantity);
 }
 
-/// Masses of species that nobody reads are not put in: no other species feels them.
+/// Masses of species that nobody reads are not put in: no other species feels them. What becomes one of them is
+/// gone.
 fn renumber_transport(transport: &mut Transport, is_read: &[bool], renumbered: &[Option<usize>]) {
+    if let Some(decay) = &mut transport.decay {
+        retain_by(&mut decay.weights, is_read);
+        decay.reactions.retain(|turn| is_read[turn.population]);
+        for turn in &mut decay.reactions {
+            turn.population = renumbered[turn.population].unwrap_or(0);
+            let outcomes = std::mem::take(&mut turn.outcomes);
+            turn.outcomes =
+                outcomes.into_iter().filter_map(|(to, chance)| Some((renumbered[to]?, chance))).collect();
+        }
+    }
     transport.populations.retain(|population| is_read[population.species]);
     transport.sources.retain(|source| is_read[source.species]);
     let of = |species: &mut usize| *species = renumbered[*species].unwrap_or(0);

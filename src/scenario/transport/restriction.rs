@@ -22,9 +22,6 @@ pub fn check(checker: &mut Checker<'_>, scenario: &Scenario) {
 /// What masses cannot do yet: one message for each kind of statement.
 fn of_mass(checker: &mut Checker<'_>, scenario: &Scenario) {
     let mut wrong: Vec<(&str, Span, &str)> = Vec::new();
-    if let Some(reaction) = scenario.reactions.first() {
-        wrong.push(("reactions", reaction.span, "use `particles fluid`, or leave the reactions out"));
-    }
     if let Some(mixing) = &scenario.mixing {
         wrong.push(("mixing zones", mixing.span, "use `particles fluid`, or leave the zones out"));
     }
@@ -48,7 +45,7 @@ fn of_mass(checker: &mut Checker<'_>, scenario: &Scenario) {
                 .at(span, "not with particles that carry mass")
                 .also(scenario.particles.kind_span, "particles that carry mass")
                 .found(what)
-                .expected("transport of species that do not react")
+                .expected("transport of species, and reactions of first order")
                 .help(help),
         );
     }
