@@ -23,9 +23,11 @@ pub mod table;
 pub mod units;
 
 use diagnostic::{Diagnostic, any_fatal};
+use flow::Flows;
 use plan::compile::{Compiled, Options, compile};
 use scenario::{Scenario, Settings, Uses};
 use source::{FileId, Sources};
+use std::sync::Arc;
 use syntax::tree;
 
 /// How far a scene came on its way from text to plan, and everything that is to be said about it.
@@ -43,6 +45,8 @@ pub struct Checked {
     pub scenario: Option<Scenario>,
     /// Absent if the scene is wrong or cannot run as asked.
     pub compiled: Option<Compiled>,
+    /// Flows that were read on the way.
+    pub flows: Arc<Flows>,
     pub diagnostics: Vec<Diagnostic>,
 }
 
@@ -84,6 +88,11 @@ pub fn check_with(
         diagnostics.extend(more);
         scenario = resolved.filter(|_| !any_fatal(&diagnostics));
     }
+    let flows = Arc::new(Flows::default());
+    if let Some(scenario) = &mut scenario {
+        diagnostics.extend(flow::scene::attach(scenario, &sources, &flows));
+    }
+    scenario = scenario.filter(|_| !any_fatal(&diagnostics));
     let compiled = scenario.as_ref().and_then(|scenario| {
         let (compiled, more) = compile(scenario, options);
         diagnostics.extend(more);
@@ -91,5 +100,5 @@ pub fn check_with(
     });
     // What stops a scene comes before what it may be run with.
     diagnostics.sort_by_key(|diagnostic| !diagnostic.is_fatal());
-    Checked { sources, file, whole, uses, scenario, compiled, diagnostics }
+    Checked { sources, file, whole, uses, scenario, compiled, flows, diagnostics }
 }

@@ -1,7 +1,10 @@
 //! Source text: files, byte spans, lines and columns.
 //!
-//! Owns the text of every file that a scene is made of. May use nothing else of the crate.
-//! It deliberately does not read from disk: callers hand in the text.
+//! Owns the text of every file that a scene is made of, and the bytes of those that it reads numbers from. May use
+//! nothing else of the crate. It deliberately does not read from disk: callers hand in texts and bytes.
+
+use bytes::Bytes;
+use std::sync::Arc;
 
 /// Which file of a [`Sources`] a span lies in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Default)]
@@ -59,6 +62,29 @@ pub struct SourceFile {
     pub text: String,
 }
 
+/// A file that a scene reads numbers from.
+#[derive(PartialEq, Eq)]
+pub struct DataFile {
+    pub name: String,
+    pub bytes: Bytes,
+    /// BLAKE3 of the bytes.
+    pub hash: String,
+}
+
+impl DataFile {
+    pub fn new(name: impl Into<String>, bytes: impl Into<Bytes>) -> Self {
+        let bytes = bytes.into();
+        let hash = blake3::hash(&bytes).to_hex().to_string();
+        Self { name: name.into(), bytes, hash }
+    }
+}
+
+impl std::fmt::Debug for DataFile {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} ({} bytes, {})", self.name, self.bytes.len(), self.hash)
+    }
+}
+
 /// A file that a scene uses and that could not be had.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct RefusedFile {
@@ -73,6 +99,7 @@ pub struct RefusedFile {
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Sources {
     files: Vec<SourceFile>,
+    data: Vec<Arc<DataFile>>,
     refused: Vec<RefusedFile>,
 }
 
@@ -94,6 +121,23 @@ impl Sources {
         FileId(id)
     }
 
+    /// Adds a file of numbers, once under each name.
+    pub fn add_data(&mut self, file: Arc<DataFile>) {
+        if self.find_data(&file.name).is_none() {
+            self.data.push(file);
+        }
+    }
+
+    /// The file of numbers of that name.
+    pub fn find_data(&self, name: &str) -> Option<&Arc<DataFile>> {
+        self.data.iter().find(|file| file.name == name)
+    }
+
+    /// All files of numbers.
+    pub fn data(&self) -> &[Arc<DataFile>] {
+        &self.data
+    }
+
     /// Notes that a file which the scene uses cannot be had, so that a message can say why.
     pub fn refuse(&mut self, file: RefusedFile) {
         self.refused.push(file);
@@ -102,6 +146,11 @@ impl Sources {
     /// Why a file is not among the sources.
     pub fn refusal(&self, name: &str) -> Option<&RefusedFile> {
         self.refused.iter().find(|file| file.name == name)
+    }
+
+    /// All files that could not be had.
+    pub fn refused(&self) -> &[RefusedFile] {
+        &self.refused
     }
 
     /// The file of that name.

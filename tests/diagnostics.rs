@@ -9,9 +9,10 @@
 use lamella::diagnostic::Diagnostic;
 use lamella::diagnostic::render::{self, Colour};
 use lamella::plan::compile::Options;
-use lamella::scenario::{Settings, wanted_files};
-use lamella::source::Sources;
+use lamella::scenario::{Settings, wanted_data, wanted_files};
+use lamella::source::{DataFile, Sources};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/diagnostics")
@@ -55,6 +56,11 @@ fn check(path: &Path) -> (Vec<Diagnostic>, Sources) {
         // What is not there is told by `check`.
         if let Ok(text) = std::fs::read_to_string(path.with_file_name(used)) {
             sources.add(name, text);
+        }
+    }
+    for name in wanted_data(&sources) {
+        if let Ok(bytes) = std::fs::read(folder().join(&name)) {
+            sources.add_data(Arc::new(DataFile::new(name, bytes)));
         }
     }
     let checked = lamella::check(sources, &settings, &options);

@@ -139,7 +139,8 @@ fn check_packages(period: &Period, step: &Value, places: &[[usize; 3]]) {
         step[kind].as_array().unwrap().iter().map(row).collect()
     };
     let [(well, rate)] = rows("WEL")[..] else { panic!("one well") };
-    assert_eq!(flow.sinks[package("WEL").sinks.clone()], [(flow.cells.cell(places[well]), -rate)]);
+    let [sink] = flow.sinks[package("WEL").sinks.clone()] else { panic!("one well") };
+    assert_eq!((sink.cell, sink.rate, sink.owner), (flow.cells.cell(places[well]), -rate, 1));
     assert!(package("STO-SS").sinks.is_empty() && package("RCH").sinks.is_empty());
     for (cell, rate) in rows("RCH") {
         let (_, top) = flow.cells.faces(2, places[cell]);
@@ -170,7 +171,7 @@ fn units_of_a_model_scale_its_flow() {
             assert_near(*scaled, plain * FOOT / DAY, "specific discharge");
         }
     }
-    assert_near(scaled.flow.sinks[0].1, plain.flow.sinks[0].1 * FOOT.powi(3) / DAY, "well");
+    assert_near(scaled.flow.sinks[0].rate, plain.flow.sinks[0].rate * FOOT.powi(3) / DAY, "well");
     assert_near(scaled.flow.through_flow(), plain.flow.through_flow() * FOOT.powi(3) / DAY, "all");
 }
 

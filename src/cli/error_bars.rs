@@ -8,10 +8,12 @@ use lamella::diagnostic::{Diagnostic, codes};
 use lamella::engine::snapshot::Snapshot;
 use lamella::engine::{self, RunError};
 use lamella::estimate::{self, Advice, Trials};
+use lamella::flow::FaceFlow;
 use lamella::plan::Plan;
 use lamella::scenario::Scenario;
 use lamella::table::ErrorBarRow;
 use serde::Serialize;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// More lines than this are in the results, not on the terminal.
@@ -26,6 +28,9 @@ pub(crate) struct ErrorBars {
     wall: f64,
 }
 
+/// The flow of a plan: that of the run, as long as nothing of it is another.
+pub(crate) type FlowOf<'a> = dyn Fn(&Plan) -> Result<Option<Arc<FaceFlow>>, RunError> + 'a;
+
 impl ErrorBars {
     /// Runs the trials one after the other.
     pub(crate) fn find(
@@ -33,7 +38,7 @@ impl ErrorBars {
         scenario: &Scenario,
         n_axes: usize,
         snapshots: &[Snapshot],
-        n_threads: usize,
+        (n_threads, flow_of): (usize, &FlowOf),
         (terminal, watch): (&Terminal, &Watch),
     ) -> Result<Self, Stopped> {
         let begin = Instant::now();
@@ -47,6 +52,7 @@ impl ErrorBars {
             let settings = engine::Settings {
                 threads: Some(n_threads),
                 takes_half_draws: trial.takes_half_draws,
+                flow: flow_of(&trial.plan).map_err(|error| run_failed(&error, scenario, plan))?,
                 ..engine::Settings::default()
             };
             let mut seen = Vec::new();

@@ -34,6 +34,25 @@ pub(crate) fn read_scene(path: &Path) -> Result<String, Stopped> {
     String::from_utf8(bytes).map_err(|error| not_utf8(path, &error))
 }
 
+/// Larger files are no tables of numbers that a scene can hold in memory.
+const MAX_DATA_BYTES: u64 = 4 << 30;
+
+/// The bytes of a file of numbers.
+pub(crate) fn read_data(path: &Path) -> Result<Vec<u8>, Stopped> {
+    if path.is_dir() {
+        return Err(unreadable(path, "it is a directory, not a file of numbers"));
+    }
+    let bytes = std::fs::File::open(path).and_then(|file| {
+        let mut bytes = Vec::new();
+        file.take(MAX_DATA_BYTES + 1).read_to_end(&mut bytes).map(|_| bytes)
+    });
+    let bytes = bytes.map_err(|error| unreadable(path, &reason(&error)))?;
+    if bytes.len() as u64 > MAX_DATA_BYTES {
+        return Err(unreadable(path, "it is larger than 4 GiB"));
+    }
+    Ok(bytes)
+}
+
 /// Writes a file whole or not at all; an existing file keeps its permissions.
 pub(crate) fn write_whole(path: &Path, text: &str) -> Result<(), Stopped> {
     let failed = |error: &std::io::Error| unwritable(path, &reason(error));

@@ -1,5 +1,6 @@
 //! From a path to a plan; what `check`, `plan` and `run` have in common.
 
+use super::data::add_data;
 use super::files::{display_name, is_stdin, read_scene};
 use super::run::scene_name;
 use super::{Exit, Stopped, Terminal, machine, record};
@@ -17,7 +18,7 @@ use std::path::Path;
 /// Reads a scene and takes it as far as it goes.
 pub(crate) fn load(path: &Path, settings: &Settings, without_passes: bool) -> Result<Checked, Stopped> {
     let mut sources = Sources::single(display_name(path), read_scene(path)?);
-    add_used(&mut sources, path);
+    add_files(&mut sources, path);
     let passes = if without_passes { Selection::None } else { Selection::All };
     let options = Options { passes, memory: machine::available_memory() };
     let checked = lamella::check(sources, settings, &options);
@@ -27,6 +28,12 @@ pub(crate) fn load(path: &Path, settings: &Settings, without_passes: bool) -> Re
         }
         _ => Ok(checked),
     }
+}
+
+/// Puts the files that a scene names among its sources: scenes that it uses, and numbers that these read.
+fn add_files(sources: &mut Sources, scene: &Path) {
+    add_used(sources, scene);
+    add_data(sources, scene);
 }
 
 /// Puts the files that a scene uses among its sources, or the reasons why they are not there.
@@ -101,7 +108,7 @@ pub(crate) fn load_sweep(
         return Err(Stopped::new(Exit::SceneWrong, message));
     }
     let mut sources = Sources::single(display_name(path), read_scene(path)?);
-    add_used(&mut sources, path);
+    add_files(&mut sources, path);
     let further: Vec<(&str, String)> = over.map(|over| ("--over", over.statement())).into_iter().collect();
     let name = if over.is_some() { Some("command_line") } else { name };
     let names = (display_name(path), scene_name(path));
@@ -132,7 +139,7 @@ pub(crate) fn load_session_at(
     terminal: &Terminal,
 ) -> Result<Option<Sweep>, Stopped> {
     let mut sources = Sources::single(display_name(path), read_scene(path)?);
-    add_used(&mut sources, path);
+    add_files(&mut sources, path);
     let of_program = session.sources[1..].iter().filter(|(name, _)| name.starts_with("--"));
     let further: Vec<(&str, String)> = of_program.map(|(name, text)| (name.as_str(), text.clone())).collect();
     let settings = Settings { set: session.set.clone(), seed: session.seed, ..Settings::default() };

@@ -5,6 +5,7 @@
 
 mod check;
 mod completions;
+mod data;
 mod error_bars;
 mod explain;
 mod facts;

@@ -13,6 +13,7 @@ use lamella::Checked;
 use lamella::diagnostic::{Diagnostic, codes};
 use lamella::engine::snapshot::{Outcome, Snapshot, Values};
 use lamella::engine::{self, Control, RunError};
+use lamella::flow::{FaceFlow, Flows};
 use lamella::measure::{self, Evaluated};
 use lamella::plan::Plan;
 use lamella::plan::compile::{Compiled, Options};
@@ -22,6 +23,7 @@ use lamella::source::Sources;
 use lamella::stop;
 use lamella::table::{Record, Summary as Written, Swept, TableError, Writer};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::Instant;
 
 const FIGURE: &str = "figure.svg";
@@ -150,6 +152,8 @@ fn run_checked(mut checked: Checked, asked: Asked, terminal: &Terminal) -> Comma
         terminal.diagnostics(&[compiled.left_out_note()], &checked.sources);
     }
     let job = Job {
+        flows: checked.flows.clone(),
+        sources: &checked.sources,
         record: record::record(&checked, &scenario, &compiled, &asked.name),
         swept: record::swept(&scenario),
         folder: asked.folder,
@@ -184,7 +188,10 @@ fn announcement(compiled: &Compiled) -> String {
 }
 
 /// A compiled scene with all that its run needs.
-struct Job {
+struct Job<'a> {
+    flows: Arc<Flows>,
+    /// What flows are read from.
+    sources: &'a Sources,
     compiled: Compiled,
     scenario: Scenario,
     record: Record,
@@ -207,7 +214,7 @@ struct Found {
     started: i64,
 }
 
-impl Job {
+impl Job<'_> {
     fn run(&self, terminal: &Terminal, interrupt: &Interrupt) -> CommandResult {
         let mut writer =
             Writer::create(&self.folder, &self.compiled.plan, &self.record).map_err(table_failed)?;
@@ -294,8 +301,11 @@ impl Job {
             }
             Ok(())
         };
-        let settings = engine::Settings { threads: Some(self.n_threads), ..engine::Settings::default() };
-        let outcome = engine::run(plan, &settings, &watch, &mut sink);
+        let outcome = self.flow_of(plan).and_then(|flow| {
+            let threads = Some(self.n_threads);
+            let settings = engine::Settings { threads, flow, ..engine::Settings::default() };
+            engine::run(plan, &settings, &watch, &mut sink)
+        });
         watch.progress.finish();
         let outcome = outcome.map_err(|error| {
             refusal.map_or_else(|| run_failed(&error, &self.scenario, plan), table_failed)
@@ -304,10 +314,15 @@ impl Job {
             .map_err(measuring_failed)?;
         let find_bars = || {
             let (n_axes, followed) = (self.record.n_axes, (terminal, &watch));
-            ErrorBars::find(plan, &self.scenario, n_axes, &snapshots, self.n_threads, followed)
+            let flow_of = &|plan: &Plan| self.flow_of(plan);
+            ErrorBars::find(plan, &self.scenario, n_axes, &snapshots, (self.n_threads, flow_of), followed)
         };
         let error_bars = self.wants.error_bars.then(find_bars).transpose()?;
         Ok(Found { outcome, snapshots, evaluated, error_bars, started })
+    }
+
+    fn flow_of(&self, plan: &Plan) -> Result<Option<Arc<FaceFlow>>, RunError> {
+        self.flows.of(plan, self.sources).map_err(|error| RunError::Flow(error.to_string()))
     }
 
     fn point(&self, found: &Found) -> lamella::table::PointRow {

@@ -77,7 +77,7 @@ fn mean_discharge(flux: &[Vec<f64>; 3]) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use crate::flow::{Cells, FaceFlow};
+    use crate::flow::{Cells, FaceFlow, Sink};
 
     fn column(flux: Vec<f64>) -> FaceFlow {
         let n = flux.len() - 1;
@@ -101,7 +101,7 @@ mod tests {
     fn still_water_is_balanced_and_a_lone_well_is_not() {
         let mut still = column(vec![0.0; 3]);
         assert_eq!(still.balance().worst_of_through_flow, 0.0);
-        still.sinks.push((1, 1.0));
+        still.sinks.push(Sink { cell: 1, rate: 1.0, owner: 0 });
         assert_eq!(still.balance().worst_of_through_flow, f64::INFINITY);
     }
 }

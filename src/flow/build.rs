@@ -17,6 +17,8 @@ pub enum FlowError {
     Cells,
     Field(FieldError),
     Darcy(DarcyError),
+    /// What is wrong with a file.
+    File(String),
 }
 
 impl fmt::Display for FlowError {
@@ -25,6 +27,7 @@ impl fmt::Display for FlowError {
             Self::Cells => write!(f, "the cells of the flow have no extent"),
             Self::Field(error) => write!(f, "{error}"),
             Self::Darcy(error) => write!(f, "{error}"),
+            Self::File(error) => write!(f, "{error}"),
         }
     }
 }
@@ -55,7 +58,8 @@ fn solve(plan: &Plan, flow: &Darcy) -> Result<Solution, FlowError> {
         None => vec![1.0; cells.n_cells()],
     };
     let mut wells = Vec::new();
-    for well in &flow.wells {
+    let mut owners = Vec::new();
+    for (owner, well) in flow.wells.iter().enumerate() {
         let place = |ends: &[f64]| {
             let mut place = [0.5; 3];
             plan.axes.iter().zip(ends).for_each(|(axis, &end)| place[axis.index] = end);
@@ -63,9 +67,13 @@ fn solve(plan: &Plan, flow: &Darcy) -> Result<Solution, FlowError> {
         };
         let found = darcy::wells(&cells, &conductivity, place(&well.low), place(&well.high), well.rate);
         wells.extend(found.map_err(FlowError::Darcy)?);
+        owners.resize(wells.len(), owner);
     }
     let problem = Problem { cells, conductivity, anisotropy, porosity, sides, wells };
-    darcy::solve(problem).map_err(FlowError::Darcy)
+    let mut solution = darcy::solve(problem).map_err(FlowError::Darcy)?;
+    // The parts of a screen belong to one well.
+    solution.flow.sinks.iter_mut().zip(owners).for_each(|(sink, owner)| sink.owner = owner);
+    Ok(solution)
 }
 
 /// Cells over the domain; an axis that it does not have is one cell from 0 to 1.

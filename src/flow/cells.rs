@@ -30,6 +30,15 @@ impl Cells {
         Self::new([along(0), along(1), along(2)])
     }
 
+    /// The same cells elsewhere; `None` if edges become one.
+    pub fn moved(&self, by: [f64; 3]) -> Option<Self> {
+        let mut edges = self.edges.clone();
+        for (edges, by) in edges.iter_mut().zip(by) {
+            edges.iter_mut().for_each(|edge| *edge += by);
+        }
+        Self::new(edges)
+    }
+
     pub fn edges(&self) -> &[Vec<f64>; 3] {
         &self.edges
     }

@@ -13,7 +13,7 @@ mod system;
 mod tests;
 pub mod wells;
 
-use super::{Cells, FaceFlow};
+use super::{Cells, FaceFlow, Sink};
 use cycle::Cycle;
 pub use error::DarcyError;
 use matrix::dot;
@@ -95,7 +95,8 @@ pub fn solve(problem: Problem) -> Result<Solution, DarcyError> {
     let mut cycle = Cycle::new(system.matrix(&problem));
     let Problem { cells, conductivity, porosity, wells, .. } = problem;
     let n = cells.n_cells();
-    let sinks = wells.iter().map(|well| (well.cell, -well.rate)).collect();
+    let sink = |(owner, well): (usize, &Well)| Sink { cell: well.cell, rate: -well.rate, owner };
+    let sinks = wells.iter().enumerate().map(sink).collect();
     let mut head = vec![0.0; n];
     let flux = system.flux(&cells, &head);
     let mut flow = FaceFlow { cells, flux, porosity, head: None, conductivity: Some(conductivity), sinks };

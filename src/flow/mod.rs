@@ -7,13 +7,18 @@ pub mod balance;
 pub mod build;
 pub mod cells;
 pub mod darcy;
+pub mod files;
+mod memo;
 pub mod random_field;
 pub mod read;
+pub mod scene;
 pub mod series;
+pub mod store;
 
 pub use balance::Balance;
 pub use cells::Cells;
 pub use series::FlowSeries;
+pub use store::Flows;
 
 /// The discharge of water through the faces of cells.
 ///
@@ -30,8 +35,17 @@ pub struct FaceFlow {
     pub head: Option<Vec<f64>>,
     /// Per cell, m/s, along x.
     pub conductivity: Option<Vec<f64>>,
-    /// `(cell, m³/s taken out)`; with fewer axes per unit of what is missing.
-    pub sinks: Vec<(usize, f64)>,
+    pub sinks: Vec<Sink>,
+}
+
+/// Water that is taken out of a cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sink {
+    pub cell: usize,
+    /// m³/s, below zero where it is put in; with fewer axes per unit of what is missing.
+    pub rate: f64,
+    /// Which well or package it belongs to, counted by whoever made the flow.
+    pub owner: usize,
 }
 
 impl FaceFlow {
@@ -53,8 +67,8 @@ impl FaceFlow {
                 *rest += area * (self.flux[axis][high] - self.flux[axis][low]);
             }
         }
-        for &(cell, rate) in &self.sinks {
-            rest[cell] += rate;
+        for sink in &self.sinks {
+            rest[sink.cell] += sink.rate;
         }
         rest
     }
@@ -76,6 +90,6 @@ impl FaceFlow {
                 }
             }
         }
-        sum + self.sinks.iter().map(|&(_, rate)| (-rate).max(0.0)).sum::<f64>()
+        sum + self.sinks.iter().map(|sink| (-sink.rate).max(0.0)).sum::<f64>()
     }
 }

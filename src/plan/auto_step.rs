@@ -37,12 +37,14 @@ pub(super) fn of_masses(
     auto: Auto,
     duration: f64,
 ) -> Chosen {
+    let of_cells = |cells: &[usize]| {
+        let width = |(axis, &cells): (&Axis, &usize)| (axis.high - axis.low) / cells as f64;
+        axes.iter().zip(cells).map(width).collect()
+    };
     let (sizes, n_cells) = match &transport.flow {
-        Flow::Darcy(darcy) => {
-            let width = |(axis, &cells): (&Axis, &usize)| (axis.high - axis.low) / cells as f64;
-            (axes.iter().zip(&darcy.cells).map(width).collect(), CELLS_PER_STEP)
-        }
-        Flow::Uniform(_) | Flow::Expression(_) | Flow::File(_) => (bin_sizes(axes, outputs), 1.0),
+        Flow::Darcy(darcy) => (of_cells(&darcy.cells), CELLS_PER_STEP),
+        Flow::File(flow) => (of_cells(&flow.facts.cells), CELLS_PER_STEP),
+        Flow::Uniform(_) | Flow::Expression(_) => (bin_sizes(axes, outputs), 1.0),
     };
     let speed = speed(axes, transport);
     let velocity = match &transport.flow {

@@ -4,7 +4,8 @@ use super::Plan;
 use super::check::{check_tape, require};
 use super::tape::Tape;
 use super::transport::{
-    Conductivity, Darcy, Decay, Dispersion, Flow, Patch, Region, SideRule, Source, Strength, Transport, Turn,
+    Conductivity, Darcy, Decay, Dispersion, Flow, FlowFacts, Patch, Region, SideRule, Source, Strength,
+    Transport, Turn,
 };
 
 impl Plan {
@@ -109,7 +110,13 @@ fn check_flow(flow: &Flow, n_axes: usize) -> Result<(), String> {
             tapes.iter().try_for_each(|it| tape(it, "the velocity"))
         }
         Flow::Darcy(darcy) => check_darcy(darcy, n_axes),
-        Flow::File(_) => Ok(()),
+        Flow::File(flow) => {
+            let FlowFacts { cells, speed, .. } = &flow.facts;
+            let is_right = cells.len() == n_axes && cells.iter().all(|n| *n >= 1);
+            require(is_right && speed.is_finite() && *speed >= 0.0, || {
+                "a flow from files does not fit the axes".into()
+            })
+        }
     }
 }
 

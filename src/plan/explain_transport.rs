@@ -6,8 +6,8 @@ use super::Plan;
 use super::explain::grouped;
 use super::tape::{Operation, Tape};
 use super::transport::{
-    Conductivity, Covariance, Darcy, DarcySide, Dispersion, Flow, Patch, Region, SideRule, Source, Strength,
-    Transport,
+    Conductivity, Covariance, Darcy, DarcySide, Dispersion, FileFlow, Flow, Patch, Region, SideRule, Source,
+    Strength, Transport,
 };
 use crate::diagnostic::number;
 
@@ -75,11 +75,29 @@ fn flow_lines(plan: &Plan, flow: &Flow) -> Vec<String> {
             vec![format!("flow: velocity ({})", parts.join(", "))]
         }
         Flow::Darcy(darcy) => darcy_lines(plan, darcy),
-        Flow::File(file) => {
-            let names: Vec<&str> = file.files.iter().map(|(name, _)| name.as_str()).collect();
-            vec![format!("flow: read from {}", names.join(", "))]
-        }
+        Flow::File(flow) => file_lines(flow),
     }
+}
+
+fn file_lines(flow: &FileFlow) -> Vec<String> {
+    let names: Vec<&str> = flow.file.files.iter().map(|file| file.name.as_str()).collect();
+    let cells: Vec<String> = flow.facts.cells.iter().map(ToString::to_string).collect();
+    let mut lines = vec![format!("flow: read from {} on {} cells", names.join(", "), cells.join(" x "))];
+    lines.extend(flow.file.files.iter().map(|file| format!("  {}: BLAKE3 {}", file.name, file.hash)));
+    lines.push(format!("  pore velocity: root mean square {} m/s", number(flow.facts.speed)));
+    let [worst, typical] = flow.facts.divergence;
+    lines.push(format!(
+        "  water that appears or vanishes: {} of the through-flow in the worst cell, which is {} of what crosses such \
+         a cell; root mean square {}",
+        number(flow.facts.missing),
+        number(worst),
+        number(typical)
+    ));
+    let outlets: Vec<&str> = flow.facts.outlets.iter().map(|outlet| outlet.name.as_str()).collect();
+    if !outlets.is_empty() {
+        lines.push(format!("  water is taken out by {}", outlets.join(", ")));
+    }
+    lines
 }
 
 fn darcy_lines(plan: &Plan, darcy: &Darcy) -> Vec<String> {

@@ -9,10 +9,11 @@ use super::lower::too_large;
 use super::shares;
 use super::tape::{Binary, Operation, Tape};
 use super::transport::{
-    Conductivity, Darcy, DarcySide, Decay, Dispersion, Flow, Interface, Patch, Population, Region, SideRule,
-    Source, Strength, Transport, Well,
+    Conductivity, Darcy, DarcySide, Decay, Dispersion, FileFlow, Flow, Interface, Patch, Population, Region,
+    SideRule, Source, Strength, Transport, Well,
 };
 use crate::diagnostic::Diagnostic;
+use crate::diagnostic::codes::R104;
 use crate::scenario::expression::Expr;
 use crate::scenario::transport as written;
 use crate::scenario::{self, Scenario};
@@ -133,6 +134,13 @@ impl Lowering<'_> {
                 Flow::Expression(tapes.into_iter().collect::<Option<_>>()?)
             }
             Some((written::Flow::Darcy(darcy), _)) => Flow::Darcy(Box::new(self.darcy(darcy)?)),
+            Some((written::Flow::File(flow), span)) => {
+                let Some(facts) = flow.facts.clone() else {
+                    self.problems.push(unread(span));
+                    return None;
+                };
+                Flow::File(Box::new(FileFlow { file: flow.file.clone(), facts }))
+            }
         })
     }
 
@@ -305,6 +313,14 @@ impl Lowering<'_> {
         list.sort_by(|a, b| a.axis.cmp(&b.axis).then(a.at.total_cmp(&b.at)));
         list
     }
+}
+
+/// Whoever makes a plan of such a scene has to read its files before.
+fn unread(span: Span) -> Diagnostic {
+    Diagnostic::error(R104, "the files of the flow have not been read")
+        .at(span, "a flow from files")
+        .found("no facts of the flow")
+        .expected("files that were read before the plan is made")
 }
 
 /// The input and the number that an operation compares.

@@ -70,7 +70,7 @@ pub(super) fn speed(axes: &[Axis], transport: &Transport) -> f64 {
             all.iter().map(square).filter(|s| s.is_finite()).fold(0.0, f64::max).sqrt()
         }
         Flow::Darcy(darcy) => darcy_speed(axes, darcy, mean(&transport.porosity, axes)),
-        Flow::File(_) => 0.0,
+        Flow::File(flow) => flow.facts.speed,
     }
 }
 

@@ -135,8 +135,8 @@ impl Plan {
         let sources = self.transport.iter().flat_map(|transport| &transport.sources);
         doors.extend(sources.map(|source| source.name.clone()));
         doors.extend((0..2 * self.axes.len()).map(|side| self.side_name(side).to_owned()));
-        let wells = self.transport.iter().flat_map(|transport| transport.drains());
-        doors.extend(wells.map(|well| well.name.clone()));
+        let wells = self.transport.iter().flat_map(|transport| transport.outlets());
+        doors.extend(wells.map(|outlet| outlet.name));
         doors
     }
 

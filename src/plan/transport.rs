@@ -5,6 +5,9 @@
 
 use super::tape::Tape;
 pub use crate::scenario::Covariance;
+pub use crate::scenario::transport::flow_file::{
+    FileColumn, FileForm, FlowFacts, FlowFile, ModflowForm, NamedFile, Outlet, TableForm, Velocity,
+};
 use serde::{Deserialize, Serialize};
 
 /// Transport in anything but uniform flow between simple sides, or of particles that carry mass.
@@ -32,10 +35,16 @@ pub struct Transport {
 }
 
 impl Transport {
-    /// Wells that take water out, and what is in it.
-    pub fn drains(&self) -> Vec<&Well> {
-        let Flow::Darcy(flow) = &self.flow else { return Vec::new() };
-        flow.wells.iter().filter(|well| well.rate < 0.0).collect()
+    /// What takes water out within the domain, and what is in it.
+    pub fn outlets(&self) -> Vec<Outlet> {
+        match &self.flow {
+            Flow::Darcy(flow) => {
+                let wells = flow.wells.iter().enumerate().filter(|(_, well)| well.rate < 0.0);
+                wells.map(|(owner, well)| Outlet { name: well.name.clone(), owner }).collect()
+            }
+            Flow::File(flow) => flow.facts.outlets.clone(),
+            Flow::Uniform(_) | Flow::Expression(_) => Vec::new(),
+        }
     }
 }
 
@@ -50,7 +59,7 @@ pub enum Flow {
     /// Solved for on cells.
     Darcy(Box<Darcy>),
     /// Read from a file.
-    File(FlowFile),
+    File(Box<FileFlow>),
 }
 
 /// Darcy flow `q = −K ∇h`, `∇·q = wells`.
@@ -107,26 +116,12 @@ pub struct Well {
     pub rate: f64,
 }
 
-/// A flow in a file of the scene's folder.
+/// A flow in files of the scene's folder.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct FlowFile {
-    pub format: FlowFormat,
-    /// File names, with the hash of each one's bytes.
-    pub files: Vec<(String, String)>,
-    /// Factors of the file's units to SI: lengths, velocities.
-    pub length: f64,
-    pub velocity: f64,
-    pub is_discharge: bool,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum FlowFormat {
-    Npy,
-    Csv,
-    Parquet,
-    Modflow6,
+pub struct FileFlow {
+    pub file: FlowFile,
+    pub facts: FlowFacts,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

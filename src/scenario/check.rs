@@ -1,5 +1,6 @@
 //! Written expressions to typed ones: names looked up, units converted, dimensions checked.
 
+use super::data_files::Files;
 use super::expression::{Expr, Node, Type};
 use super::results::Measuring;
 use super::scope::{BUILT_IN_FUNCTIONS, Locals, Origin, Progress, Scope, is_slip};
@@ -60,6 +61,7 @@ pub(super) struct Checker<'a> {
     pub(super) checked: BTreeMap<Span, &'a tree::Expr>,
     /// Constants whose values are being worked out, each for the one before it.
     pub(super) running: Vec<String>,
+    pub(super) files: Files,
 }
 
 impl<'a> Checker<'a> {

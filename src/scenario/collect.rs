@@ -76,6 +76,7 @@ pub fn resolve(
         measuring: None,
         checked: Default::default(),
         running: Vec::new(),
+        files: super::data_files::Files::of(sources),
     };
     define_names(&mut checker, &statements, &overrides);
     let scenario = build(&mut checker, &statements, settings, file, has_syntax_errors);

@@ -9,6 +9,7 @@ mod chemistry;
 mod choice;
 mod collect;
 pub mod condition;
+mod data_files;
 mod equilibrium;
 pub mod expression;
 mod fields;
@@ -42,6 +43,7 @@ use transport::{Auto, Dispersion, Flow, Patch, Shares, Source};
 
 pub use choice::{Activity, Covariance, Integrator, OutputKind, Placement, Side, Splitting, Station};
 pub use collect::resolve;
+pub use data_files::wanted_data;
 pub use geometry::MAX_BINS;
 pub use measure::{Fact, Field, FieldTarget, Norm, Scalar};
 pub use model::MAX_STEPS;
@@ -107,7 +109,7 @@ impl Scenario {
         let flows = match self.flow.as_ref().map(|flow| &flow.value) {
             None => false,
             Some(Flow::Uniform(velocity)) => velocity.iter().any(|v| *v != 0.0),
-            Some(Flow::Expression(_) | Flow::Darcy(_)) => true,
+            Some(Flow::Expression(_) | Flow::Darcy(_) | Flow::File(_)) => true,
         };
         let disperses = match self.dispersion.as_ref().map(|dispersion| &dispersion.value) {
             None => false,

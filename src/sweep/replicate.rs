@@ -8,6 +8,7 @@ use super::{Key, Scene, key_text};
 use crate::diagnostic::codes;
 use crate::engine::snapshot::{Outcome, Snapshot, Values};
 use crate::engine::{self, Control, RunError};
+use crate::flow::FaceFlow;
 use crate::measure::{self, Evaluated};
 use crate::plan::compile::Compiled;
 use crate::plan::evaluation::Evaluation;
@@ -16,6 +17,7 @@ use crate::report;
 use crate::scenario::Scenario;
 use crate::stop;
 use crate::table::{ErrorRow, PointRow, Status, Value};
+use std::sync::Arc;
 use std::time::Instant;
 
 /// A plan with the seed of one replicate.
@@ -58,7 +60,10 @@ impl Task<'_> {
         let refusal = self.too_large().or_else(|| self.fault(around));
         let outcome = match refusal {
             Some(refusal) => Err(refusal),
-            None => engine::run(&self.plan, &settings, control, &mut sink),
+            None => self.flow().and_then(|flow| {
+                settings.flow = flow;
+                engine::run(&self.plan, &settings, control, &mut sink)
+            }),
         };
         let outcome = match outcome {
             Ok(outcome) => Ok(outcome),
@@ -104,6 +109,12 @@ impl Task<'_> {
     fn too_large(&self) -> Option<RunError> {
         let bytes = self.compiled.cost.bytes();
         self.memory.is_some_and(|memory| bytes > memory).then_some(RunError::OutOfMemory { bytes })
+    }
+
+    /// The flow that this plan shares with others of the sweep.
+    fn flow(&self) -> Result<Option<Arc<FaceFlow>>, RunError> {
+        let flow = self.scene.flows.of(&self.plan, &self.scene.sources);
+        flow.map_err(|error| RunError::Flow(error.to_string()))
     }
 
     /// Failures asked for, to test how a sweep bears them.

@@ -6,6 +6,8 @@
 use super::Key;
 use super::seed::seed;
 use crate::diagnostic::Diagnostic;
+use crate::flow::Flows;
+use crate::flow::scene::attach;
 use crate::plan::Plan;
 use crate::plan::compile::{Compiled, Options, compile};
 use crate::scenario::sweep::{AxisValue, Sweep, Target};
@@ -23,6 +25,8 @@ pub struct Scene {
     pub settings: Settings,
     pub options: Options,
     pub sweep: Sweep,
+    /// Flows that points share.
+    pub flows: Flows,
     root_seed: u64,
 }
 
@@ -44,7 +48,7 @@ impl Scene {
         sweep: Sweep,
     ) -> Self {
         let root_seed = settings.seed.or(sweep.seed).unwrap_or(scenario.seed);
-        Self { file, sources, settings, options, sweep, root_seed }
+        Self { file, sources, settings, options, sweep, flows: Flows::default(), root_seed }
     }
 
     pub fn root_seed(&self) -> u64 {
@@ -141,9 +145,12 @@ impl Scene {
         let point = point.iter().map(|value| (value.target.clone(), value.value.expr.clone())).collect();
         let settings = Settings { point: Some(point), ..self.settings.clone() };
         // Settings of the command line add texts: to a copy, so that they do not pile up.
-        let mut sources = if settings.set.is_empty() { Sources::default() } else { self.sources.clone() };
+        let is_alone = settings.set.is_empty() && self.sources.data().is_empty();
+        let mut sources = if is_alone { Sources::default() } else { self.sources.clone() };
         let (scenario, diagnostics) = scenario::resolve(&self.file, &mut sources, &settings, false);
-        scenario.ok_or_else(|| first_fatal(diagnostics))
+        let mut scenario = scenario.ok_or_else(|| first_fatal(diagnostics))?;
+        let found = attach(&mut scenario, &self.sources, &self.flows);
+        if crate::diagnostic::any_fatal(&found) { Err(first_fatal(found)) } else { Ok(scenario) }
     }
 
     /// The plan of a combination with the seed of its replicate 0.

@@ -7,7 +7,8 @@ mod transport;
 
 use crate::source::{Span, Spanned};
 pub use transport::{
-    Boundary, DarcyEntry, DarcyKind, Dispersion, Flow, FlowArgument, RegionArgument, Source, Well,
+    Boundary, Column, DarcyEntry, DarcyKind, Dispersion, FileEntry, FileValue, Flow, FlowArgument,
+    RegionArgument, Source, Well,
 };
 
 /// A name with its place.

@@ -125,7 +125,7 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
         let n_populations = site.transport.populations.len();
         let units = Units::new(&releases, n_populations, site.transport.decay.as_ref());
         let doors = releases.iter().map(|release| release.door).collect();
-        let n_doors = 1 + site.transport.sources.len() + 2 * D + site.transport.drains().len();
+        let n_doors = 1 + site.transport.sources.len() + 2 * D + site.transport.outlets().len();
         Ok(Self {
             carriers: site.carriers(),
             book: Book::new(
@@ -152,7 +152,7 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
     }
 
     pub fn note(&mut self, events: &[Event]) {
-        let n_sides = 2 * D + self.site.transport.drains().len();
+        let n_sides = 2 * D + self.site.transport.outlets().len();
         for event in events {
             self.book.note(event, n_sides);
             if !self.gates.are_none() {

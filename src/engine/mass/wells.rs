@@ -8,19 +8,16 @@ use super::world::Site;
 use crate::flow::FaceFlow;
 
 impl<const D: usize> Site<'_, D> {
-    /// The cells that wells take water from.
+    /// The cells that wells and packages take water from.
     pub fn drains(&self) -> Vec<Drain<D>> {
         let Some(flow) = &self.flow else { return Vec::new() };
         let mut drains = Vec::new();
-        for (idx, well) in self.transport.drains().into_iter().enumerate() {
-            for &(cell, rate) in flow.sinks.iter().filter(|(_, rate)| *rate > 0.0) {
-                let [low, high] = self.cell(flow, cell);
-                let meets = |axis: usize| well.low[axis] < high[axis] && well.high[axis] >= low[axis];
-                if (0..D).all(meets) {
-                    let volume: f64 = (0..D).map(|axis| high[axis] - low[axis]).product();
-                    let water = flow.porosity[cell] * volume;
-                    drains.push(Drain { low, high, rate: rate / water, side: 2 * D + idx });
-                }
+        for (idx, outlet) in self.transport.outlets().into_iter().enumerate() {
+            for sink in flow.sinks.iter().filter(|sink| sink.owner == outlet.owner && sink.rate > 0.0) {
+                let [low, high] = self.cell(flow, sink.cell);
+                let volume: f64 = (0..D).map(|axis| high[axis] - low[axis]).product();
+                let water = flow.porosity[sink.cell] * volume;
+                drains.push(Drain { low, high, rate: sink.rate / water, side: 2 * D + idx });
             }
         }
         drains

@@ -119,7 +119,8 @@ fn the_drawdown_of_a_well_is_that_of_thiem() {
     close(at(16, 12) - at(8, 6), factor * ln(2.0), 2e-3);
     const PEACEMAN: f64 = 0.198_506;
     close(at(20, 0) - at(0, 0), factor * ln(20.0 / PEACEMAN), 1e-3);
-    assert_eq!(flow.sinks, [(cells.cell([200, 200, 0]), 0.5)]);
+    let sink = crate::flow::Sink { cell: cells.cell([200, 200, 0]), rate: 0.5, owner: 0 };
+    assert_eq!(flow.sinks, [sink]);
     close(flow.through_flow(), 0.5, 1e-12);
 }
 

@@ -4,7 +4,10 @@
 //! single cell.
 
 use super::error::{Kind, ReadError};
-use crate::flow::{Cells, FaceFlow};
+use crate::flow::{Cells, FaceFlow, Sink};
+
+/// The owner of what crosses the outer faces along an axis that goes is this and the axis.
+pub const ACROSS: usize = 1 << 32;
 
 /// The flow on the axes in `keep`, in that order: `[0, 1]` is the map of a model with one layer, `[0, 2]` the
 /// section of a model with one row. What crosses the outer faces along the other axes becomes sinks.
@@ -28,14 +31,15 @@ pub fn on_axes(flow: FaceFlow, keep: &[usize]) -> Result<FaceFlow, ReadError> {
             .help("a domain without that axis needs a flow with one cell along it"));
     }
     let length: f64 = gone.iter().map(|&axis| flow.cells.width(axis, 0)).product();
-    let mut sinks: Vec<(usize, f64)> = flow.sinks.iter().map(|&(cell, rate)| (cell, rate / length)).collect();
+    let mut sinks: Vec<Sink> =
+        flow.sinks.iter().map(|sink| Sink { rate: sink.rate / length, ..*sink }).collect();
     for &axis in &gone {
         for cell in 0..flow.cells.n_cells() {
             let place = flow.cells.place(cell);
             let (low, high) = flow.cells.faces(axis, place);
             let rate = flow.cells.face_area(axis, place) * (flow.flux[axis][high] - flow.flux[axis][low]);
             if rate != 0.0 {
-                sinks.push((cell, rate / length));
+                sinks.push(Sink { cell, rate: rate / length, owner: ACROSS + axis });
             }
         }
     }
@@ -65,7 +69,8 @@ mod tests {
         flux[2] = vec![0.0, 0.0, 0.0, 0.0, 0.0, -0.25, 0.0, 0.0, 0.0];
         flux[1][7] = -0.5;
         let porosity = vec![0.3; 6];
-        let sinks = vec![(2, 0.0), (4, 2.0)];
+        let sink = |cell, rate| Sink { cell, rate, owner: 1 };
+        let sinks = vec![sink(2, 0.0), sink(4, 2.0)];
         FaceFlow { cells, flux, porosity, head: None, conductivity: None, sinks }
     }
 
@@ -80,7 +85,8 @@ mod tests {
             assert!((after - before / 4.0).abs() < 1e-15);
         }
         // The face at y = 4 m of the cell above in the middle lets in 0.5 m/s through 1 m².
-        assert_eq!(turned.sinks, [(2, 0.0), (4, 0.5), (3, -0.125)]);
+        let sinks: Vec<_> = turned.sinks.iter().map(|sink| (sink.cell, sink.rate, sink.owner)).collect();
+        assert_eq!(sinks, [(2, 0.0, 1), (4, 0.5, 1), (3, -0.125, ACROSS + 1)]);
     }
 
     #[test]

@@ -93,7 +93,7 @@ fn number(field: &Field, column: &str) -> Result<f64, ReadError> {
     }
     let error = wrong(format!("`{}` in column `{column}` is no finite number", field.shown()));
     let with_e = text.replace(['d', 'D'], "e");
-    Err(if text.replacen(',', ".", 1).parse::<f64>().is_ok() {
+    Err(if text.contains(',') && text.replacen(',', ".", 1).parse::<f64>().is_ok() {
         error.help("write a decimal point")
     } else if with_e.parse::<f64>().is_ok() {
         error.help(format!("write `{with_e}`"))

@@ -13,6 +13,7 @@ pub mod npy;
 pub mod parquet;
 pub mod points;
 pub mod table;
+pub mod window;
 
 mod bytes;
 mod npy_header;

@@ -8,6 +8,7 @@ use super::super::collect::Statements;
 use super::super::expression::Expr;
 use super::super::slot::tuple_parts;
 use super::Flow;
+use super::file::FileKind;
 use crate::diagnostic::codes::{D009, M001, M002, M004};
 use crate::diagnostic::{Diagnostic, precise};
 use crate::source::Spanned;
@@ -19,10 +20,17 @@ enum Kind {
     Uniform,
     Velocity,
     Darcy,
+    File(FileKind),
 }
 
-const KINDS: &[(&str, Kind)] =
-    &[("uniform", Kind::Uniform), ("velocity", Kind::Velocity), ("darcy", Kind::Darcy)];
+const KINDS: &[(&str, Kind)] = &[
+    ("uniform", Kind::Uniform),
+    ("velocity", Kind::Velocity),
+    ("darcy", Kind::Darcy),
+    ("table", Kind::File(FileKind::Table)),
+    ("grid", Kind::File(FileKind::Grid)),
+    ("modflow", Kind::File(FileKind::Modflow)),
+];
 
 /// `Some(None)`: there is no flow statement, and nothing flows.
 pub fn flow<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> Option<Option<Spanned<Flow>>> {
@@ -35,6 +43,9 @@ pub fn flow<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> Optio
         (Kind::Velocity, FlowArgument::Assigned(value)) => velocity(checker, value)?,
         (Kind::Darcy, FlowArgument::Entries(entries)) => {
             Flow::Darcy(Box::new(super::darcy::darcy(checker, statement, entries)?))
+        }
+        (Kind::File(kind), FlowArgument::Files(names, entries)) => {
+            Flow::File(Box::new(super::file::file(checker, kind, &statement.kind, names, entries)?))
         }
         _ => {
             report_argument(checker, kind, statement);
@@ -55,12 +66,28 @@ fn report_argument(checker: &mut Checker<'_>, kind: Kind, statement: &tree::Flow
             "`= (u, v)`, one expression for each axis",
         ),
         Kind::Darcy => ("`flow darcy` needs its entries", "no `{ … }` after this", "`{`, entries, `}`"),
+        Kind::File(FileKind::Table) => (
+            "`flow table` needs a file and its columns",
+            "no file name in quotes after this",
+            "`\"field.csv\" { at …; velocity … }`",
+        ),
+        Kind::File(FileKind::Grid) => (
+            "`flow grid` needs its files",
+            "no file name in quotes after this",
+            "`\"v.npy\" { velocity [m/d] }`",
+        ),
+        Kind::File(FileKind::Modflow) => (
+            "`flow modflow` needs a budget file",
+            "no file name in quotes after this",
+            "`\"model.bud\" { grid \"model.dis.grb\"; length [m]; time [d] }`",
+        ),
     };
     let found = match statement.argument {
         FlowArgument::None => "the end of the statement",
         FlowArgument::Value(_) => "a value",
         FlowArgument::Assigned(_) => "`=`",
         FlowArgument::Entries(_) => "`{`",
+        FlowArgument::Files(..) => "a file",
     };
     checker.report(
         Diagnostic::error(M004, message).at(statement.kind.span, label).found(found).expected(expected),

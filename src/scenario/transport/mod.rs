@@ -5,12 +5,17 @@
 
 pub(super) mod darcy;
 pub(super) mod dispersion;
+pub(super) mod file;
+mod file_columns;
 pub(super) mod flow;
+pub mod flow_file;
 pub(super) mod lognormal;
 pub(super) mod masses;
 pub(super) mod restriction;
 pub(super) mod sides;
 pub(super) mod source;
+
+pub use file::FileFlow;
 
 use super::choice::Covariance;
 use super::expression::Expr;
@@ -24,6 +29,7 @@ pub enum Flow {
     /// m/s, an expression of the place for each axis of the domain.
     Expression(Vec<Expr>),
     Darcy(Box<Darcy>),
+    File(Box<FileFlow>),
 }
 
 /// What is solved for the flow.

@@ -85,7 +85,7 @@ fn of_fluid(checker: &mut Checker<'_>, scenario: &Scenario) {
         wrong.push(("sources".into(), source.span));
     }
     match scenario.flow.as_ref().map(|flow| (&flow.value, flow.span)) {
-        Some((Flow::Expression(_) | Flow::Darcy(_), span)) => {
+        Some((Flow::Expression(_) | Flow::Darcy(_) | Flow::File(_), span)) => {
             wrong.push(("flow that varies in space".into(), span))
         }
         Some((Flow::Uniform(_), _)) | None => {}

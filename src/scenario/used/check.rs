@@ -18,9 +18,9 @@ pub(super) fn too_many(statement: &Use) -> Diagnostic {
         .expected(format!("at most {MAX_USES}"))
 }
 
-/// The name of a used file among the sources; none if its path does not go down from the folder of the
+/// The name of a file among the sources; none if its path does not go down from the folder of the
 /// file that uses it.
-pub(super) fn name_of(user: &str, path: &str) -> Option<String> {
+pub(in crate::scenario) fn name_of(user: &str, path: &str) -> Option<String> {
     let is_inside = |part: &str| !part.is_empty() && part != "..";
     // A backslash or a colon would mean another place on some machines.
     if path.contains(['\\', ':', '\0']) || !path.split('/').all(is_inside) {

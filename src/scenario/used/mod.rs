@@ -9,6 +9,8 @@ mod check;
 mod merge;
 mod visit;
 
+pub(super) use check::name_of;
+
 use super::reference::reference_name;
 use super::{Scenario, Settings};
 use crate::diagnostic::Diagnostic;

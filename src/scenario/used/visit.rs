@@ -3,9 +3,9 @@
 //! Owns the walk. May use the tree. It deliberately knows no meaning: who visits says what to do.
 
 use crate::syntax::tree::{
-    Assignment, Axis, Count, DarcyEntry, DarcyKind, Dispersion, Expr, ExprKind, Field, FlowArgument, Name,
-    Output, Place, Range, Rate, RegionArgument, Source, StatementKind, SweepAxis, SweepEntry, SweepValue,
-    Times,
+    Assignment, Axis, Count, DarcyEntry, DarcyKind, Dispersion, Expr, ExprKind, Field, FileValue,
+    FlowArgument, Name, Output, Place, Range, Rate, RegionArgument, Source, StatementKind, SweepAxis,
+    SweepEntry, SweepValue, Times,
 };
 
 /// What is done at each place.
@@ -105,6 +105,13 @@ fn transport(kind: &mut StatementKind, visitor: &mut impl Visitor) {
             FlowArgument::None => {}
             FlowArgument::Value(it) | FlowArgument::Assigned(it) => expression(it, visitor),
             FlowArgument::Entries(list) => list.iter_mut().for_each(|it| darcy_entry(it, visitor)),
+            FlowArgument::Files(_, list) => {
+                for entry in list {
+                    if let FileValue::Value(it) = &mut entry.value {
+                        expression(it, visitor);
+                    }
+                }
+            }
         },
         StatementKind::Dispersion(Dispersion::Value(it)) => expression(it, visitor),
         StatementKind::Dispersion(Dispersion::Parts(list)) => fields(list, visitor),

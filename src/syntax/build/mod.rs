@@ -116,7 +116,7 @@ fn is_punctuation(rule: Rule) -> bool {
             | R::close_round
             | R::open_brace
             | R::close_brace
-    ) || matches!(rule, R::dots | R::rate_sign | R::times_sign | R::zone_end | R::EOI)
+    ) || matches!(rule, R::dots | R::rate_sign | R::times_sign | R::zone_end | R::entry_end | R::EOI)
         || is_keyword(rule)
 }
 

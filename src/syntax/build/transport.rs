@@ -8,8 +8,8 @@ use super::{Parts, span_at, spanned};
 use crate::syntax::climb::Built;
 use crate::syntax::grammar::Rule;
 use crate::syntax::tree::{
-    Assignment, Boundary, DarcyEntry, DarcyKind, Dispersion, Expr, Field, Flow, FlowArgument, Name,
-    RegionArgument, Source, Well,
+    Assignment, Boundary, Column, DarcyEntry, DarcyKind, Dispersion, Expr, Field, FileEntry, FileValue, Flow,
+    FlowArgument, Name, RegionArgument, Source, Well,
 };
 use pest::iterators::Pair;
 
@@ -38,6 +38,9 @@ pub fn flow(parts: &mut Parts) -> Built<Flow> {
     let text = parts.pairs.clone().find(|pair| matches!(pair.as_rule(), Rule::assign | Rule::darcy));
     let is_assigned = text.is_some_and(|pair| pair.as_rule() == Rule::assign);
     let kind = parts.wrapped_name(Rule::kind)?;
+    if let Some(pair) = parts.take(Rule::files) {
+        return Ok(Flow { kind, argument: files(&mut Parts::of(parts.place, pair))? });
+    }
     let argument = match parts.take(Rule::darcy) {
         Some(pair) => FlowArgument::Entries(entries(&mut Parts::of(parts.place, pair))?),
         None => match parts.optional_expression()? {
@@ -47,6 +50,43 @@ pub fn flow(parts: &mut Parts) -> Built<Flow> {
         },
     };
     Ok(Flow { kind, argument })
+}
+
+fn files(parts: &mut Parts) -> Built<FlowArgument> {
+    let mut names = Vec::new();
+    while let Some(text) = parts.optional_text()? {
+        names.push(text);
+    }
+    Ok(FlowArgument::Files(names, each(parts, Rule::file_entry, file_entry)?))
+}
+
+fn file_entry(parts: &mut Parts) -> Built<FileEntry> {
+    let word = parts.need(Rule::entry_word)?;
+    let word = spanned(parts.place, &word);
+    let value = match parts.pairs.peek().map(Pair::as_rule) {
+        Some(Rule::file_unit) => FileValue::Unit(file_unit(parts)?),
+        Some(Rule::corner) => {
+            let pair = parts.need(Rule::corner)?;
+            FileValue::Value(Parts::of(parts.place, pair).expression()?)
+        }
+        _ => FileValue::Columns(each(parts, Rule::file_column, file_column)?),
+    };
+    Ok(FileEntry { word, value })
+}
+
+fn file_unit(parts: &mut Parts) -> Built<Name> {
+    let pair = parts.need(Rule::file_unit)?;
+    let unit = Parts::of(parts.place, pair).need(Rule::unit)?;
+    Ok(spanned(parts.place, &unit))
+}
+
+fn file_column(parts: &mut Parts) -> Built<Column> {
+    let text = parts.optional_text()?;
+    let is_quoted = text.is_some();
+    let name = text.map_or_else(|| parts.name(), Ok)?;
+    let has_unit = parts.pairs.peek().is_some_and(|pair| pair.as_rule() == Rule::file_unit);
+    let unit = has_unit.then(|| file_unit(parts)).transpose()?;
+    Ok(Column { name, is_quoted, unit })
 }
 
 fn entries(parts: &mut Parts) -> Built<Vec<DarcyEntry>> {

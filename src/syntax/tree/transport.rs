@@ -2,7 +2,7 @@
 //!
 //! Owns their shapes. May use the tree. It deliberately knows no physics.
 
-use super::{Assignment, Axis, Expr, Field, Name, Range};
+use super::{Assignment, Axis, Expr, Field, Name, Range, Text};
 use crate::source::Span;
 
 #[derive(Debug, Clone, PartialEq)]
@@ -21,7 +21,7 @@ pub struct Boundary {
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Flow {
-    /// A catalogue name: `uniform`, `velocity`, `darcy`.
+    /// A catalogue name: `uniform`, `velocity`, `darcy`, `table`, `grid`, `modflow`.
     pub kind: Name,
     pub argument: FlowArgument,
 }
@@ -35,6 +35,34 @@ pub enum FlowArgument {
     Assigned(Expr),
     /// `darcy { … }`
     Entries(Vec<DarcyEntry>),
+    /// `table "field.csv" { … }`
+    Files(Vec<Text>, Vec<FileEntry>),
+}
+
+/// An entry of a flow from files, by the word that it begins with.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FileEntry {
+    pub word: Name,
+    pub value: FileValue,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum FileValue {
+    /// `length [m]`
+    Unit(Name),
+    /// `origin (0 m, 0 m)`
+    Value(Expr),
+    /// `at x [m], y [m]`, `grid "model.dis.grb"`, `top RCH`
+    Columns(Vec<Column>),
+}
+
+/// A column of a table, or another thing that has a name in a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Column {
+    pub name: Name,
+    /// Whether the name stands in quotes.
+    pub is_quoted: bool,
+    pub unit: Option<Name>,
 }
 
 #[derive(Debug, Clone, PartialEq)]

@@ -10,7 +10,7 @@ use super::{Package, Period, Settings, Side};
 use crate::flow::read::bytes::doubles;
 use crate::flow::read::error::{Kind, ReadError};
 use crate::flow::read::npy::porosity;
-use crate::flow::{Cells, FaceFlow};
+use crate::flow::{Cells, FaceFlow, Sink};
 
 const FACES: &str = "FLOW-JA-FACE";
 const SATURATION: &str = "DATA-SAT";
@@ -97,8 +97,12 @@ impl Model<'_> {
             match &record.body {
                 Body::Array(_) if record.text == FACES => {}
                 _ if is_data => {}
-                Body::Array(data) => packages.push(self.stored(&mut flow, &record.text, data)?),
-                Body::List(list) => packages.push(self.package(&mut flow, &record.text, list)?),
+                Body::Array(data) => {
+                    packages.push(self.stored(&mut flow, packages.len(), &record.text, data)?)
+                }
+                Body::List(list) => {
+                    packages.push(self.package(&mut flow, packages.len(), &record.text, list)?)
+                }
             }
         }
         let active = saturation.iter().zip(&self.solid).filter(|(_, solid)| **solid > 0.0);
@@ -225,7 +229,13 @@ impl Model<'_> {
     }
 
     /// Storage and the like: one number per cell, positive into the flow.
-    fn stored(&self, flow: &mut FaceFlow, text: &str, data: &[u8]) -> Result<Package, ReadError> {
+    fn stored(
+        &self,
+        flow: &mut FaceFlow,
+        owner: usize,
+        text: &str,
+        data: &[u8],
+    ) -> Result<Package, ReadError> {
         let n = data.len() / 8;
         if n != self.grid.n_cells() {
             let message = format!("{text} has {n} entries, the grid {} cells", self.grid.n_cells());
@@ -235,13 +245,19 @@ impl Model<'_> {
         }
         let start = flow.sinks.len();
         for (cell, rate) in doubles(data).enumerate().filter(|(cell, _)| self.grid.is_active(*cell)) {
-            self.add_sink(flow, cell, rate, text)?;
+            self.add_sink(flow, (owner, text), cell, rate)?;
         }
         let (kind, name) = (text.to_owned(), String::new());
         Ok(Package { kind, name, sinks: start..flow.sinks.len(), through_faces: 0.0 })
     }
 
-    fn package(&self, flow: &mut FaceFlow, text: &str, list: &List) -> Result<Package, ReadError> {
+    fn package(
+        &self,
+        flow: &mut FaceFlow,
+        owner: usize,
+        text: &str,
+        list: &List,
+    ) -> Result<Package, ReadError> {
         let start = flow.sinks.len();
         let by_flow = list.column("IFLOWFACE");
         let by_path = list.column("IFACE");
@@ -258,7 +274,7 @@ impl Model<'_> {
                 (None, None) => named.map(|(_, side)| *side),
             };
             match side.and_then(|side| self.outer_face(cell, side)) {
-                None => self.add_sink(flow, cell, entry.flow(), text)?,
+                None => self.add_sink(flow, (owner, text), cell, entry.flow())?,
                 Some((axis, face, inward)) => {
                     let rate = finite(entry.flow(), text, || self.grid.shown(cell))?
                         * self.settings.length.powi(3)
@@ -286,7 +302,13 @@ impl Model<'_> {
     }
 
     /// Books water that enters a cell from nowhere; none is not booked.
-    fn add_sink(&self, flow: &mut FaceFlow, cell: usize, rate: f64, text: &str) -> Result<(), ReadError> {
+    fn add_sink(
+        &self,
+        flow: &mut FaceFlow,
+        (owner, text): (usize, &str),
+        cell: usize,
+        rate: f64,
+    ) -> Result<(), ReadError> {
         let rate = finite(rate, text, || self.grid.shown(cell))?;
         if rate == 0.0 {
             return Ok(());
@@ -296,7 +318,8 @@ impl Model<'_> {
                 format!("{text} has a flow of {rate} in {}, which is not active", self.grid.shown(cell));
             return Err(ReadError::new(Kind::Mismatch, message));
         }
-        flow.sinks.push((self.number[cell], -rate * self.settings.length.powi(3) / self.settings.time));
+        let rate = -rate * self.settings.length.powi(3) / self.settings.time;
+        flow.sinks.push(Sink { cell: self.number[cell], rate, owner });
         Ok(())
     }
 }

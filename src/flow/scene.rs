@@ -1,0 +1,68 @@
+//! Files of a scene's flow: read before its plan is made, and what is wrong with them.
+//!
+//! Owns these messages. May use the scenario and the readers. It deliberately refuses no flow for its balance: it tells
+//! how much is missing.
+
+use super::files::Trouble;
+use super::read::window::Extent;
+use super::store::Flows;
+use crate::diagnostic::codes::{M033, N205};
+use crate::diagnostic::{Diagnostic, number};
+use crate::plan::build_tape::build_tape;
+use crate::plan::tape::{Operation, Tape};
+use crate::plan::transport::FlowFacts;
+use crate::scenario::Scenario;
+use crate::scenario::transport::{FileFlow, Flow};
+use crate::source::{Sources, Span};
+
+/// Divergence in a cell, relative to mean discharge over cell size, above which concentrations show it.
+const LARGEST_DIVERGENCE: f64 = 1e-2;
+
+/// Reads the files of a scenario's flow, if it has some, and tells the scenario what is in them.
+pub fn attach(scenario: &mut Scenario, sources: &Sources, flows: &Flows) -> Vec<Diagnostic> {
+    let axes: Vec<Extent> =
+        scenario.domain.axes.iter().map(|axis| (axis.index, axis.low, axis.high)).collect();
+    let porosity = match &scenario.medium {
+        None => Some(Tape { operations: vec![Operation::Constant(1.0)] }),
+        Some(porosity) => build_tape(&porosity.value, &scenario.species),
+    };
+    let Some(flow) = &mut scenario.flow else { return Vec::new() };
+    let span = flow.span;
+    // An expression that is too large for a tape is told by the plan.
+    let (Flow::File(own), Some(porosity)) = (&mut flow.value, porosity) else { return Vec::new() };
+    match flows.read(&own.file, &axes, &porosity, sources) {
+        Err(trouble) => vec![refusal(own, &trouble)],
+        Ok(loaded) => {
+            own.facts = Some(loaded.facts.clone());
+            warning(&loaded.facts, span).into_iter().collect()
+        }
+    }
+}
+
+fn refusal(flow: &FileFlow, trouble: &Trouble) -> Diagnostic {
+    let name = flow.file.files.get(trouble.file).map_or("", |file| file.name.as_str());
+    let span = flow.spans.get(trouble.file).copied().unwrap_or_default();
+    let error = &trouble.error;
+    let place = error.place.as_ref().map(|place| format!("{place} of ")).unwrap_or_default();
+    let message = Diagnostic::error(M033, format!("the flow cannot be read: {}", error.message))
+        .at(span, format!("in {place}\"{name}\""))
+        .found(error.message.clone())
+        .expected("a file that holds the flow of this domain");
+    match &error.help {
+        Some(help) => message.help(help.clone()),
+        None => message,
+    }
+}
+
+fn warning(facts: &FlowFacts, span: Span) -> Option<Diagnostic> {
+    let [worst, typical] = facts.divergence;
+    if worst <= LARGEST_DIVERGENCE {
+        return None;
+    }
+    let message = Diagnostic::warning(N205, "the flow of these files does not keep its water")
+        .at(span, format!("in one cell {} of what crosses such a cell appears or vanishes", number(worst)))
+        .found(format!("a relative divergence of {}, root mean square {}", number(worst), number(typical)))
+        .expected(format!("at most {LARGEST_DIVERGENCE} in every cell"))
+        .help("particles gather where water vanishes; discharge through faces keeps its balance, means of cells do not");
+    Some(message)
+}
