@@ -4,6 +4,7 @@
 
 pub mod catalog;
 pub mod chemistry;
+pub mod data;
 pub mod diagnostic;
 pub mod engine;
 pub mod estimate;

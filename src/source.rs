@@ -1,9 +1,9 @@
 //! Source text: files, byte spans, lines and columns.
 //!
-//! Owns the text of every file that a scene is made of, and the bytes of those that it reads numbers from. May use
-//! nothing else of the crate. It deliberately does not read from disk: callers hand in texts and bytes.
+//! Owns the text of every file that a scene is made of, and its files of numbers. May use these only.
+//! It deliberately does not read from disk: callers hand in the text.
 
-use bytes::Bytes;
+use crate::data::DataFile;
 use std::sync::Arc;
 
 /// Which file of a [`Sources`] a span lies in.
@@ -60,29 +60,6 @@ impl<T> Spanned<T> {
 pub struct SourceFile {
     pub name: String,
     pub text: String,
-}
-
-/// A file that a scene reads numbers from.
-#[derive(PartialEq, Eq)]
-pub struct DataFile {
-    pub name: String,
-    pub bytes: Bytes,
-    /// BLAKE3 of the bytes.
-    pub hash: String,
-}
-
-impl DataFile {
-    pub fn new(name: impl Into<String>, bytes: impl Into<Bytes>) -> Self {
-        let bytes = bytes.into();
-        let hash = blake3::hash(&bytes).to_hex().to_string();
-        Self { name: name.into(), bytes, hash }
-    }
-}
-
-impl std::fmt::Debug for DataFile {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} ({} bytes, {})", self.name, self.bytes.len(), self.hash)
-    }
 }
 
 /// A file that a scene uses and that could not be had.

@@ -6,11 +6,12 @@
 //! does without. Files that a scene uses stand in folders inside the phase. `LAMELLA_BLESS=1`
 //! (`make bless`) writes the messages anew; look at the difference before you commit it.
 
+use lamella::data::DataFile;
 use lamella::diagnostic::Diagnostic;
 use lamella::diagnostic::render::{self, Colour};
 use lamella::plan::compile::Options;
 use lamella::scenario::{Settings, wanted_data, wanted_files};
-use lamella::source::{DataFile, Sources};
+use lamella::source::Sources;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 /// Modules that may use each other and all modules of the lines above, but none of the lines below.
 const LAYERS: &[&[&str]] = &[
-    &["source", "diagnostic", "units", "maths", "state"],
+    &["source", "diagnostic", "units", "maths", "state", "data"],
     &["catalog"],
     &["syntax"],
     &["scenario"],

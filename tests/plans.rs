@@ -230,7 +230,8 @@ fn a_plan_document_reads_back_and_notices_changes() {
     let sources = Sources::single("scene.lam", COLUMN);
     let checked = lamella::check(sources, &Settings::default(), &Options::default());
     let scenario = checked.scenario.expect("the scene is right");
-    let text = document::write(&compiled, &scenario, &[document::EmbeddedSource::new("scene.lam", COLUMN)]);
+    let sources = [document::EmbeddedSource::new("scene.lam", COLUMN)];
+    let text = document::write(&compiled, &scenario, &sources, &[]);
     let (plan, evaluation) = document::read(&text).expect("the document reads back");
     assert_eq!(plan, compiled.plan);
     assert_eq!(evaluation, compiled.evaluation);

@@ -55,6 +55,11 @@ pub(crate) fn read_data(path: &Path) -> Result<Vec<u8>, Stopped> {
 
 /// Writes a file whole or not at all; an existing file keeps its permissions.
 pub(crate) fn write_whole(path: &Path, text: &str) -> Result<(), Stopped> {
+    write_whole_bytes(path, text.as_bytes())
+}
+
+/// The same for bytes.
+pub(crate) fn write_whole_bytes(path: &Path, bytes: &[u8]) -> Result<(), Stopped> {
     let failed = |error: &std::io::Error| unwritable(path, &reason(error));
     // Through a link, so that the link stays a link.
     let target = std::fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
@@ -70,7 +75,7 @@ pub(crate) fn write_whole(path: &Path, text: &str) -> Result<(), Stopped> {
         Ok(metadata) => metadata.permissions(),
         Err(_) => default_permissions(),
     };
-    file.write_all(text.as_bytes())
+    file.write_all(bytes)
         .and_then(|()| file.as_file().set_permissions(permissions))
         .and_then(|()| file.as_file().sync_all())
         .map_err(|error| failed(&error))?;

@@ -1,6 +1,6 @@
 //! From a path to a plan; what `check`, `plan` and `run` have in common.
 
-use super::data::add_data;
+use super::data::{add_data, restore_of_sweep};
 use super::files::{display_name, is_stdin, read_scene};
 use super::run::scene_name;
 use super::{Exit, Stopped, Terminal, machine, record};
@@ -116,8 +116,8 @@ pub(crate) fn load_sweep(
     loaded.map(Sweep::without_swept_settings).transpose()
 }
 
-/// The sweep of a session of a journal.
-pub(crate) fn load_session(session: &Session) -> Result<Option<Sweep>, Stopped> {
+/// The sweep of a session of a journal in a folder.
+pub(crate) fn load_session(folder: &Path, session: &Session) -> Result<Option<Sweep>, Stopped> {
     let Some((path, text)) = session.sources.first() else { return Ok(None) };
     let mut sources = Sources::single(path, text);
     let (of_program, used): (Vec<_>, Vec<_>) =
@@ -125,6 +125,7 @@ pub(crate) fn load_session(session: &Session) -> Result<Option<Sweep>, Stopped> 
     for (name, text) in used {
         sources.add(name, text);
     }
+    restore_of_sweep(folder, &session.data, &mut sources)?;
     let further: Vec<(&str, String)> =
         of_program.iter().map(|(name, text)| (name.as_str(), text.clone())).collect();
     let settings = Settings { set: session.set.clone(), seed: session.seed, ..Settings::default() };
@@ -224,8 +225,10 @@ impl Sweep {
     /// What a journal remembers of this start.
     pub(crate) fn session(&self, started: i64, facts: Vec<(String, String)>) -> Session {
         let texts = self.scene.sources.files().filter(|(_, file)| file.name != "--set");
+        let data = self.scene.sources.data().iter().map(|file| (file.name.clone(), file.hash.clone()));
         Session {
             sources: texts.map(|(_, file)| (file.name.clone(), file.text.clone())).collect(),
+            data: data.collect(),
             set: self.scene.settings.set.clone(),
             seed: self.scene.settings.seed,
             sweep: self.scene.sweep.name.clone(),

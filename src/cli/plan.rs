@@ -71,7 +71,8 @@ fn product(arguments: &Arguments, checked: &Checked) -> Option<String> {
         Some(Emit::Yaml) => {
             let name = checked.sources.file(FileId(0)).name.clone();
             let sources = record::embedded(checked, name);
-            Some(document::write(compiled?, scenario?, &sources))
+            let data = super::data::named_data(&checked.sources);
+            Some(document::write(compiled?, scenario?, &sources, &data))
         }
         None => compiled.map(|compiled| {
             let title = scenario.and_then(|scenario| scenario.title.as_deref());

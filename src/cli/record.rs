@@ -1,5 +1,6 @@
 //! What the tables are told about a run: where it came from, and how it went.
 
+use super::data::named_data;
 use super::machine;
 use lamella::Checked;
 use lamella::engine::snapshot::Outcome;
@@ -24,13 +25,15 @@ pub(crate) fn record(
     let text = &checked.sources.file(FileId(0)).text;
     let scene_text = syntax::format(&checked.file, text);
     let sources = embedded(checked, format!("{scene_name}.lam"));
+    let data = named_data(&checked.sources);
     let mut record = Record {
         scene_name: scene_name.to_owned(),
         plan_hash: compiled.hash.clone(),
-        plan_yaml: document::write(compiled, scenario, &sources),
+        plan_yaml: document::write(compiled, scenario, &sources, &data),
         version: VERSION.to_owned(),
         scene_source: text.clone(),
         scene_text,
+        data: data.into_iter().map(|file| (file.name, file.hash)).collect(),
         ..Record::default()
     };
     add_scenario(&mut record, scenario);

@@ -1,5 +1,6 @@
 //! `lamella run`: a scene, all the way to tables, errors and a figure.
 
+use super::data::keep_of_run;
 use super::error_bars::ErrorBars;
 use super::files::{is_stdin, unwritable, write_whole};
 use super::interrupt::Interrupt;
@@ -190,7 +191,7 @@ fn announcement(compiled: &Compiled) -> String {
 /// A compiled scene with all that its run needs.
 struct Job<'a> {
     flows: Arc<Flows>,
-    /// What flows are read from.
+    /// What flows and tables are read from; kept beside the tables of the run.
     sources: &'a Sources,
     compiled: Compiled,
     scenario: Scenario,
@@ -233,7 +234,8 @@ impl Job<'_> {
             // A figure of an earlier run must not stand beside the tables of this one.
             None => drop(std::fs::remove_file(&figure_path)),
         }
-        self.write_crate(found.started, &written)?;
+        let data = keep_of_run(&self.folder, self.sources)?;
+        self.write_crate(found.started, &written, data)?;
         let measures = record::measures(&found.evaluated);
         let summary = Summary {
             folder: &self.folder,
@@ -255,7 +257,7 @@ impl Job<'_> {
     }
 
     /// Tells where the tables come from.
-    fn write_crate(&self, started: i64, written: &Written) -> Result<(), Stopped> {
+    fn write_crate(&self, started: i64, written: &Written, data: Vec<String>) -> Result<(), Stopped> {
         let version = self.record.version.clone();
         let figure = self.wants.figure.then(|| FIGURE.to_owned());
         let provenance = Provenance {
@@ -270,7 +272,7 @@ impl Job<'_> {
             started: Some(started),
             finished: Some(machine::now()),
             failure: None,
-            files: written.files.iter().map(|file| file.name.clone()).chain(figure).collect(),
+            files: written.files.iter().map(|file| file.name.clone()).chain(figure).chain(data).collect(),
         };
         let text =
             provenance.to_json().map_err(|reason| unwritable(&self.folder.join(CRATE_FILE), &reason))?;

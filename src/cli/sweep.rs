@@ -86,6 +86,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
     let mut folder = Folder::open(&out, shard)?;
     folder.must_hold(&loaded, &out)?;
     let session = loaded.session(machine::now(), facts::facts(Some(&arguments.file), threads));
+    super::data::keep_of_sweep(&out, &loaded.scene.sources)?;
     let session = folder.journal.add_session(session).map_err(|error| failed(&error))?;
     announce(&points, &folder, terminal);
     let watch = Progress::new(terminal, &interrupt, &out, &loaded, &points);

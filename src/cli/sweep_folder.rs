@@ -165,7 +165,7 @@ pub(crate) fn gather(arguments: &GatherArguments, terminal: &Terminal) -> Comman
 /// The journals of a folder and the sweep of their newest session.
 pub(crate) fn open(folder: &Path) -> Result<(Vec<Journal>, load::Sweep), Stopped> {
     let journals = journals(folder)?;
-    let loaded = newest(&journals).map(load::load_session).transpose()?.flatten();
+    let loaded = newest(&journals).map(|session| load::load_session(folder, session)).transpose()?.flatten();
     let loaded = loaded.ok_or_else(|| {
         let text = format!("the scene in the journal of {} cannot be read by this version", folder.display());
         Stopped::new(Exit::SceneWrong, Diagnostic::error(codes::F121, text))

@@ -1,5 +1,6 @@
 //! `lamella verify` and `lamella repro`: the same again, and the same bytes.
 
+use super::data::restore_of_run;
 use super::run::Wants;
 use super::sweep::{failed, pool};
 use super::sweep_folder::{Which, open, point_of};
@@ -11,6 +12,8 @@ use lamella::scenario::Settings;
 use lamella::source::Sources;
 use std::path::{Path, PathBuf};
 
+/// Folder of the files of numbers that the scene reads.
+const KEPT: &str = "data";
 /// Folder of the table that only `run --error` writes.
 const ERROR_BARS: &str = "error_bars";
 
@@ -62,6 +65,7 @@ fn verify_run(folder: &Path, threads: usize, terminal: &Terminal) -> CommandResu
     for (name, text) in document.used() {
         sources.add(name, text);
     }
+    restore_of_run(folder, &document.data, &mut sources)?;
     let again = tempfile::Builder::new()
         .prefix(".lamella-verify-")
         .tempdir_in(folder)
@@ -90,6 +94,10 @@ fn different_files(first: &Path, second: &Path) -> std::io::Result<Vec<String>> 
     for entry in std::fs::read_dir(second)? {
         let entry = entry?;
         let name = entry.file_name().to_string_lossy().into_owned();
+        if name == KEPT {
+            // The run was made from these: they have been looked at.
+            continue;
+        }
         if entry.path().is_dir() {
             for part in std::fs::read_dir(entry.path())? {
                 let part = format!("{name}/{}", part?.file_name().to_string_lossy());
@@ -155,6 +163,7 @@ pub(crate) fn repro(arguments: &ReproArguments, terminal: &Terminal) -> CommandR
     for (_, file) in texts {
         sources.add(file.name.clone(), file.text.clone());
     }
+    loaded.scene.sources.data().iter().for_each(|file| sources.add_data(file.clone()));
     let wants = Wants { figure: true, error_bars: false };
     run_command::run_sources(sources, &loaded.scene_name, &settings, &out, threads, wants, terminal)
 }

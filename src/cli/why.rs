@@ -40,7 +40,9 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
         let (will_run, reason) = known(journal, entry)?;
         return head.tell(will_run, &reason, terminal);
     }
-    let Some((old, old_plan)) = counterpart(&journals, &now, point.combination, replicate)? else {
+    let Some((old, old_plan)) =
+        counterpart(&arguments.folder, &journals, &now, point.combination, replicate)?
+    else {
         return head.tell(true, "no point with these values was ever run", terminal);
     };
     let Some(found) = difference(&old_plan, &plan) else {
@@ -110,6 +112,7 @@ fn known(journal: &Journal, entry: Entry) -> Result<(bool, String), Stopped> {
 
 /// The newest session that ran a point with the same values, with that point's plan.
 fn counterpart(
+    folder: &Path,
     journals: &[Journal],
     now: &load::Sweep,
     combination: u64,
@@ -122,7 +125,7 @@ fn counterpart(
         .collect();
     sessions.sort_by_key(|(journal, idx)| std::cmp::Reverse(journal.sessions[*idx].started));
     for (journal, idx) in sessions {
-        let Some(old) = load::load_session(&journal.sessions[idx])? else { continue };
+        let Some(old) = load::load_session(folder, &journal.sessions[idx])? else { continue };
         let n = old.scene.n_combinations();
         let Some(same) = (0..n).find(|&other| old.scene.assignments(other) == wanted) else { continue };
         let Ok((_, compiled)) = old.scene.compile(same) else { continue };
@@ -161,9 +164,21 @@ fn show(old: &load::Sweep, now: &load::Sweep, found: &Difference, terminal: &Ter
         };
         terminal.diagnostics(&[message], &sources);
     }
-    if all.is_empty() {
+    let changed = changed_files(old, now);
+    for name in &changed {
+        terminal.remark(&format!("{name} holds other numbers than it did"));
+    }
+    if all.is_empty() && changed.is_empty() {
         terminal.remark("the scene is written as it was: a setting, the seed or the version is another one");
     }
+}
+
+/// Files of numbers that are others today.
+fn changed_files<'a>(old: &load::Sweep, now: &'a load::Sweep) -> Vec<&'a str> {
+    let was = |name: &str| old.scene.sources.find_data(name).map(|file| file.hash.as_str());
+    let files = now.scene.sources.data().iter();
+    let changed = files.filter(|file| was(&file.name).is_some_and(|hash| hash != file.hash));
+    changed.map(|file| file.name.as_str()).collect()
 }
 
 /// Whether a path is the folder of a sweep.

@@ -36,7 +36,7 @@ macro_rules! codes {
 }
 
 // Families: S syntax, D names and definitions, U units and dimensions, M the model as a whole,
-// W sweeps, N numerical limits, L left out, F files and settings, R the run.
+// W sweeps, T tables of numbers, N numerical limits, L left out, F files and settings, R the run.
 codes! {
     S001 "the text does not fit the grammar here",
     S002 "a line begins with a word that begins no statement",
@@ -135,6 +135,10 @@ codes! {
     M031 "a source that cannot be",
     M032 "an output that needs particles with mass",
     M033 "a flow cannot be read from its files",
+    T101 "a table of numbers cannot be read",
+    T102 "the rows of a table make no function",
+    T103 "a table is asked beyond its rows",
+    T104 "a table may be asked beyond its rows",
     N101 "means over few particles are mostly noise",
     N102 "the step is coarse for a mixing zone",
     N103 "the bins add dispersion",

@@ -46,7 +46,8 @@ impl<'a> Comparison<'a> {
         let mut n_empty = 0;
         for (observed, expected) in self.series.times[times.clone()].iter().zip(&self.expected[times]) {
             for (bin, &expected) in expected.iter().enumerate() {
-                if !observed.is_filled[bin] {
+                let is_gap = self.reference.has_gaps && expected.is_nan();
+                if !observed.is_filled[bin] || is_gap {
                     n_empty += 1;
                     continue;
                 }
@@ -81,13 +82,19 @@ impl<'a> Comparison<'a> {
 
     /// The reference along the axis of a profile at every time, or over time; none for maps.
     pub(super) fn curves(&self) -> Result<Vec<Curve>, String> {
-        let curve = |t, x, y| Curve {
-            reference: self.reference.reference.name.clone(),
-            output_idx: self.series.output_idx,
-            quantity: self.reference.reference.target,
-            t,
-            x,
-            y,
+        let has_gaps = self.reference.has_gaps;
+        let curve = |t, x: Vec<f64>, y: Vec<f64>| {
+            // Where there are no data nothing is drawn.
+            let points = x.into_iter().zip(y).filter(|(_, y)| !(has_gaps && y.is_nan()));
+            let (x, y) = points.unzip();
+            Curve {
+                reference: self.reference.reference.name.clone(),
+                output_idx: self.series.output_idx,
+                quantity: self.reference.reference.target,
+                t,
+                x,
+                y,
+            }
         };
         let grid = &self.series.grid;
         let Some(axis_idx) = grid.profile_axis() else {

@@ -159,6 +159,10 @@ fn fill(
             let reference = references.get(*idx).ok_or("it uses a reference that does not exist.")?;
             for time in &mut target.times {
                 time.values = reference.bin_means(time.t, &target.grid);
+                if reference.has_gaps {
+                    let values = time.is_filled.iter_mut().zip(&time.values);
+                    values.for_each(|(is_filled, value)| *is_filled &= !value.is_nan());
+                }
             }
             let quantity = reference.reference.target;
             if column(run.output(on), quantity).is_some() {

@@ -15,6 +15,8 @@ pub(super) struct Prepared<'a> {
     pub(super) idx: usize,
     pub(super) reference: &'a Reference,
     solution: Built<'a>,
+    /// Whether it has no value, and is no number, where measured data have none.
+    pub(super) has_gaps: bool,
 }
 
 enum Built<'a> {
@@ -45,7 +47,8 @@ impl<'a> Prepared<'a> {
                 Built::Catalogue(built.map_err(|reason| format!("Reference `{}`: {reason}", reference.name))?)
             }
         };
-        Ok(Self { idx, reference, solution })
+        let has_gaps = matches!(solution, Built::Expression(tape) if tape.reads_tables());
+        Ok(Self { idx, reference, solution, has_gaps })
     }
 
     pub(super) fn applies_to(&self, output: &Output) -> bool {

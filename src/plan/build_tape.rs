@@ -1,6 +1,7 @@
 //! Expressions to tapes: shared sub-expressions once, constants already folded.
 
-use super::tape::{Operation, Register, Tape};
+use super::tape::{Lookup, Operation, Register, Tape};
+use crate::data::Beyond;
 use crate::scenario::Species;
 use crate::scenario::expression::{Expr, Node};
 use std::collections::BTreeMap;
@@ -14,11 +15,20 @@ const MAX_OPERATIONS: usize = 65_000;
 /// Compiles an expression over x, y, z, t; names of species stand for their initial
 /// concentrations. `None` if it needs more operations than a tape can hold.
 pub fn build_tape(expr: &Expr, species: &[Species]) -> Option<Tape> {
-    let mut builder = Builder { operations: Vec::new(), known: BTreeMap::new(), initial: Some(species) };
+    tape(expr, species, Beyond::Hold)
+}
+
+/// The same for what results are held against: beyond the rows of a table there is nothing to compare.
+pub fn build_reference(expr: &Expr, species: &[Species]) -> Option<Tape> {
+    tape(expr, species, Beyond::Nothing)
+}
+
+fn tape(expr: &Expr, species: &[Species], beyond: Beyond) -> Option<Tape> {
+    let mut builder = Builder::new(Some(species), beyond);
     let result = builder.add_expr(expr)?;
     if usize::from(result) + 1 != builder.operations.len() {
         // The last register is the result: repeat a shared one at the end.
-        let operation = builder.operations[usize::from(result)];
+        let operation = builder.operations[usize::from(result)].clone();
         builder.operations.push(operation);
     }
     Some(Tape { operations: builder.operations })
@@ -27,7 +37,7 @@ pub fn build_tape(expr: &Expr, species: &[Species]) -> Option<Tape> {
 /// Compiles rates over x, y, z, t and the current concentrations of all species, as one program with a
 /// register for each. `None` if it needs more operations than a tape can hold.
 pub fn build_rates(rates: &[Expr]) -> Option<(Vec<Operation>, Vec<Register>)> {
-    let mut builder = Builder { operations: Vec::new(), known: BTreeMap::new(), initial: None };
+    let mut builder = Builder::new(None, Beyond::Hold);
     let registers = rates.iter().map(|rate| builder.add_expr(rate)).collect::<Option<_>>()?;
     Some((builder.operations, registers))
 }
@@ -40,6 +50,8 @@ struct Builder<'s> {
     known: BTreeMap<Key, Register>,
     /// Names of species stand for the initial concentrations of these, or for current ones.
     initial: Option<&'s [Species]>,
+    /// What tables are beyond their rows.
+    beyond: Beyond,
 }
 
 /// An operation with the bits of its constant, so that equal ones are found.
@@ -50,9 +62,14 @@ enum Key {
     Unary(crate::maths::operator::Unary, Register),
     Binary(crate::maths::operator::Binary, Register, Register),
     Select(Register, Register, Register),
+    Table(String, [Register; 3]),
 }
 
-impl Builder<'_> {
+impl<'s> Builder<'s> {
+    fn new(initial: Option<&'s [Species]>, beyond: Beyond) -> Self {
+        Self { operations: Vec::new(), known: BTreeMap::new(), initial, beyond }
+    }
+
     fn add_expr(&mut self, expr: &Expr) -> Option<Register> {
         match &expr.node {
             Node::Constant(value) => self.add(Operation::Constant(*value)),
@@ -76,6 +93,12 @@ impl Builder<'_> {
                 let (then, otherwise) = (self.add_expr(then)?, self.add_expr(otherwise)?);
                 self.add(Operation::Select(condition, then, otherwise))
             }
+            Node::Table(table, at) => {
+                let registers = at.iter().map(|expr| self.add_expr(expr)).collect::<Option<Vec<_>>>()?;
+                let first = *registers.first()?;
+                let at = std::array::from_fn(|axis| registers.get(axis).copied().unwrap_or(first));
+                self.add(Operation::Table(Lookup { table: table.clone(), at, beyond: self.beyond }))
+            }
         }
     }
 
@@ -86,6 +109,7 @@ impl Builder<'_> {
             Operation::Unary(operator, a) => Key::Unary(operator, a),
             Operation::Binary(operator, a, b) => Key::Binary(operator, a, b),
             Operation::Select(a, b, c) => Key::Select(a, b, c),
+            Operation::Table(ref lookup) => Key::Table(lookup.table.hash().to_owned(), lookup.at),
         };
         if let Some(register) = self.known.get(&key) {
             return Some(*register);

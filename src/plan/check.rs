@@ -127,6 +127,7 @@ pub(super) fn check_operations(operations: &[Operation], n_inputs: usize) -> Res
             Operation::Unary(_, a) => is_before(a),
             Operation::Binary(_, a, b) => is_before(a) && is_before(b),
             Operation::Select(a, b, c) => is_before(a) && is_before(b) && is_before(c),
+            Operation::Table(ref lookup) => lookup.at.iter().all(|&register| is_before(register)),
         };
         require(is_right, || format!("operation {idx} of a tape reads what is not there"))?;
     }

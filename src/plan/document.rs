@@ -26,6 +26,15 @@ impl EmbeddedSource {
     }
 }
 
+/// A file of numbers that a scene reads; its bytes stand beside the plan.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct NamedData {
+    /// From the folder of the scene.
+    pub name: String,
+    /// BLAKE3 of the bytes.
+    pub hash: String,
+}
+
 /// `--set name=value`, as it was given.
 #[derive(Serialize)]
 struct Setting<'a> {
@@ -55,6 +64,8 @@ struct WrittenDocument<'a> {
     evaluation: &'a Evaluation,
     left_out: &'a [LeftOut],
     sources: &'a [EmbeddedSource],
+    #[serde(skip_serializing_if = "<[NamedData]>::is_empty")]
+    data: &'a [NamedData],
 }
 
 #[derive(Deserialize)]
@@ -66,7 +77,12 @@ struct ReadDocument {
 }
 
 /// The YAML text of a compiled plan, with what the scene and the command line set.
-pub fn write(compiled: &Compiled, scenario: &Scenario, sources: &[EmbeddedSource]) -> String {
+pub fn write(
+    compiled: &Compiled,
+    scenario: &Scenario,
+    sources: &[EmbeddedSource],
+    data: &[NamedData],
+) -> String {
     let settings = scenario.settings.iter().map(|(name, value)| Setting { name, value });
     let parameters = scenario.parameters.iter().map(|parameter| Parameter {
         name: &parameter.name,
@@ -84,6 +100,7 @@ pub fn write(compiled: &Compiled, scenario: &Scenario, sources: &[EmbeddedSource
         evaluation: &compiled.evaluation,
         left_out: &compiled.left_out,
         sources,
+        data,
     };
     serde_yaml::to_string(&document).expect("a plan is made of numbers, lists and names")
 }
@@ -96,6 +113,7 @@ pub struct Origin {
     pub seed: u64,
     /// The scene, then the files that it uses.
     pub sources: Vec<EmbeddedSource>,
+    pub data: Vec<NamedData>,
 }
 
 impl Origin {
@@ -127,10 +145,12 @@ pub fn origin(text: &str) -> Result<Origin, String> {
         settings: Vec<ReadSetting>,
         plan: Seeded,
         sources: Vec<EmbeddedSource>,
+        #[serde(default)]
+        data: Vec<NamedData>,
     }
     let read: ReadOrigin = serde_yaml::from_str(text).map_err(|error| format!("not a plan: {error}"))?;
     let settings = read.settings.into_iter().map(|setting| (setting.name, setting.value)).collect();
-    Ok(Origin { settings, seed: read.plan.seed, sources: read.sources })
+    Ok(Origin { settings, seed: read.plan.seed, sources: read.sources, data: read.data })
 }
 
 /// Reads a plan back; one sentence if the text is no plan, or not the one whose hash it carries.

@@ -114,6 +114,10 @@ fn bounds(operations: &[Operation], is_none: &dyn Fn(usize) -> bool) -> Vec<Inte
             Operation::Unary(unary, a) => Interval::unary(unary, read(a)),
             Operation::Binary(binary, a, b) => Interval::binary(binary, read(a), read(b)),
             Operation::Select(a, b, c) => Interval::select(read(a), read(b), read(c)),
+            Operation::Table(ref lookup) => {
+                let (low, high) = lookup.table.range();
+                Interval::new(low, high)
+            }
         };
         list.push(bounds);
     }

@@ -1,6 +1,6 @@
 //! Scenario to plan, literally: everything the scene says, nothing left out yet.
 
-use super::build_tape::build_tape;
+use super::build_tape::build_reference;
 use super::evaluation::{self, Evaluation};
 use super::lower_chemistry::{self, Network};
 use super::lower_decay;
@@ -229,7 +229,7 @@ fn evaluation(scenario: &Scenario, problems: &mut Vec<Diagnostic>) -> Evaluation
             scenario::Solution::Catalogue { name, arguments } => {
                 evaluation::Solution::Catalogue { name: (*name).to_owned(), arguments: arguments.clone() }
             }
-            scenario::Solution::Expression(expr) => match build_tape(expr, &scenario.species) {
+            scenario::Solution::Expression(expr) => match build_reference(expr, &scenario.species) {
                 Some(tape) => evaluation::Solution::Expression(tape),
                 None => {
                     problems.push(too_large(reference.span));

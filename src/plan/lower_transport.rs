@@ -329,9 +329,9 @@ fn threshold(tape: &Tape, operation: &Operation) -> Option<(u16, f64)> {
     if !matches!(operator, Binary::Less | Binary::LessEqual | Binary::Greater | Binary::GreaterEqual) {
         return None;
     }
-    match (tape.operations[usize::from(a)], tape.operations[usize::from(b)]) {
+    match (&tape.operations[usize::from(a)], &tape.operations[usize::from(b)]) {
         (Operation::Input(input), Operation::Constant(at))
-        | (Operation::Constant(at), Operation::Input(input)) => Some((input, at)),
+        | (Operation::Constant(at), Operation::Input(input)) => Some((*input, *at)),
         _ => None,
     }
 }

@@ -22,6 +22,9 @@ impl<'a> Checker<'a> {
     ) -> Option<Expr> {
         let checked: Vec<Option<Expr>> =
             arguments.iter().map(|argument| self.check_with(&argument.value, allow, locals)).collect();
+        if let Some(table) = self.table_of(&function.value) {
+            return self.lookup(table, function, arguments, checked, span);
+        }
         let name = function.value.as_str();
         let user = self.scope.get_mut(name).map(|entry| {
             entry.n_uses += 1;

@@ -59,6 +59,8 @@ pub(super) struct Checker<'a> {
     pub(super) measuring: Option<Measuring>,
     /// The whole expressions of the scene that have been checked, by their places.
     pub(super) checked: BTreeMap<Span, &'a tree::Expr>,
+    /// Tables of numbers by their names; nothing for one that is wrong, which has been told.
+    pub(super) tables: BTreeMap<String, Option<super::data::Known>>,
     /// Constants whose values are being worked out, each for the one before it.
     pub(super) running: Vec<String>,
     pub(super) files: Files,

@@ -20,6 +20,7 @@ pub(super) struct Statements<'a> {
     pub lets: Vec<&'a tree::Let>,
     pub params: Vec<&'a tree::Param>,
     pub functions: Vec<&'a tree::Function>,
+    pub data: Vec<&'a tree::Data>,
     pub species: Vec<&'a tree::Species>,
     pub reactions: Vec<(Span, &'a tree::Reaction)>,
     pub chemistry: Option<(Span, &'a [tree::Field])>,
@@ -77,8 +78,10 @@ pub fn resolve(
         checked: Default::default(),
         running: Vec::new(),
         files: super::data_files::Files::of(sources),
+        tables: Default::default(),
     };
     define_names(&mut checker, &statements, &overrides);
+    super::data::read(&mut checker, &statements);
     let scenario = build(&mut checker, &statements, settings, file, has_syntax_errors);
     let axes: Vec<String> = checker.axes.iter().map(|(name, _)| name.clone()).collect();
     let mut diagnostics = std::mem::take(&mut checker.diagnostics);
@@ -146,6 +149,7 @@ fn gather<'a>(file: &'a tree::File, diagnostics: &mut Vec<Diagnostic>) -> Statem
             StatementKind::Let(s) => all.lets.push(s),
             StatementKind::Param(s) => all.params.push(s),
             StatementKind::Function(s) => all.functions.push(s),
+            StatementKind::Data(s) => all.data.push(s),
             StatementKind::Species(list) => all.species.extend(list),
             StatementKind::Reaction(s) => all.reactions.push((span, s)),
             StatementKind::Chemistry(s) => all.chemistry = Some((span, s)),
@@ -203,6 +207,9 @@ fn define_names<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>, over
     for statement in &statements.functions {
         scope.define(&statement.name, Origin::Function(statement), &axes, diagnostics);
         report_twice_named_parameters(statement, diagnostics);
+    }
+    for statement in &statements.data {
+        scope.define(&statement.name, Origin::Data(statement), &axes, diagnostics);
     }
     for (idx, statement) in statements.species.iter().enumerate() {
         scope.define(&statement.name, Origin::Species(idx), &axes, diagnostics);
@@ -302,9 +309,15 @@ fn build<'a>(
         sweeps,
         reports,
     };
-    super::reactions::check_places(checker, &scenario);
-    super::transport::restriction::check(checker, &scenario);
+    check_together(checker, &scenario);
     Some(scenario)
+}
+
+/// What only the whole scene shows.
+fn check_together(checker: &mut Checker<'_>, scenario: &Scenario) {
+    super::data::check_extents(checker, scenario);
+    super::reactions::check_places(checker, scenario);
+    super::transport::restriction::check(checker, scenario);
 }
 
 /// `--set name=value` without the blanks around.

@@ -4,7 +4,7 @@
 //! constants that follow a swept parameter: their value here would be that of another point.
 
 use super::check::{Allow, Checker};
-use super::expression::{Expr, Node, Type};
+use super::expression::{Expr, Node, Type, coordinates};
 use super::scope::{Locals, Origin};
 use super::slot::collect_names;
 use super::sweep::Target;
@@ -153,6 +153,10 @@ impl Condition {
             Node::Select(condition, a, b) => {
                 let chosen = if self.value_of(condition, value) != 0.0 { a } else { b };
                 self.value_of(chosen, value)
+            }
+            Node::Table(table, at) => {
+                let at: Vec<f64> = at.iter().map(|expr| self.value_of(expr, value)).collect();
+                table.value(coordinates(&at))
             }
         }
     }

@@ -6,9 +6,10 @@
 use super::check::Checker;
 use super::transport::flow_file::NamedFile;
 use super::used::name_of;
+use crate::data::DataFile;
 use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{F105, F106};
-use crate::source::{DataFile, RefusedFile, Sources};
+use crate::source::{RefusedFile, Sources};
 use crate::syntax::tree::{FileEntry, FileValue, FlowArgument, StatementKind, Text};
 use std::sync::Arc;
 
@@ -32,8 +33,14 @@ impl Files {
 }
 
 impl Checker<'_> {
-    /// The file of numbers that a text names.
+    /// The file of numbers that a text names, by its name and hash.
     pub(super) fn data_file(&mut self, written: &Text) -> Option<NamedFile> {
+        let file = self.file_of_numbers(written)?;
+        Some(NamedFile { name: written.value.clone(), hash: file.hash.clone() })
+    }
+
+    /// The file of numbers that a text names.
+    pub(super) fn file_of_numbers(&mut self, written: &Text) -> Option<Arc<DataFile>> {
         let (path, span) = (written.value.as_str(), written.span);
         let text = self.files.texts.get(usize::from(span.file.0)).map_or("", String::as_str);
         let outside = || {
@@ -48,7 +55,7 @@ impl Checker<'_> {
             return None;
         };
         if let Some(file) = self.files.data.iter().find(|file| file.name == name) {
-            return Some(NamedFile { name: path.to_owned(), hash: file.hash.clone() });
+            return Some(file.clone());
         }
         let message = match self.files.refused.iter().find(|file| file.name == name) {
             Some(refused) if refused.is_outside => outside().note(refused.reason.clone()),
@@ -70,24 +77,36 @@ impl Checker<'_> {
 pub fn wanted_data(sources: &Sources) -> Vec<String> {
     let mut list: Vec<String> = Vec::new();
     for (id, file) in sources.files() {
-        if !file.text.lines().any(|line| line.trim_start_matches('\u{feff}').trim_start().starts_with("flow"))
-        {
+        let begins = |word: &str| {
+            file.text.lines().any(|line| line.trim_start_matches('\u{feff}').trim_start().starts_with(word))
+        };
+        if !begins("flow") && !begins("data") {
             continue;
         }
         let (tree, _) = crate::syntax::parse(id, &file.text);
-        for statement in &tree.statements {
-            let StatementKind::Flow(flow) = &statement.kind else { continue };
-            let FlowArgument::Files(names, entries) = &flow.argument else { continue };
-            for text in names.iter().chain(entries.iter().flat_map(texts)) {
-                if let Some(name) = name_of(&file.name, &text.value)
-                    && !list.contains(&name)
-                {
-                    list.push(name);
-                }
+        for text in tree.statements.iter().flat_map(|statement| named_by(&statement.kind)) {
+            if let Some(name) = name_of(&file.name, &text.value)
+                && !list.contains(&name)
+            {
+                list.push(name);
             }
         }
     }
     list
+}
+
+/// The files of numbers that a statement names.
+fn named_by(kind: &StatementKind) -> Vec<&Text> {
+    match kind {
+        StatementKind::Data(data) => vec![&data.path],
+        StatementKind::Flow(flow) => match &flow.argument {
+            FlowArgument::Files(names, entries) => {
+                names.iter().chain(entries.iter().flat_map(texts)).collect()
+            }
+            _ => Vec::new(),
+        },
+        _ => Vec::new(),
+    }
 }
 
 /// File names among the entries: `grid "model.dis.grb"`. A column in quotes has a unit, or stands in a list that is

@@ -3,9 +3,11 @@
 //! Owns the typed tree and its construction with folding of constants. May use the words.
 //! It deliberately knows no names: `check` turns a written expression into this.
 
+use crate::data::{Beyond, Lookup, Table};
 use crate::maths::operator::{Binary, Unary};
 use crate::source::Span;
 use crate::units::Dimension;
+use std::sync::Arc;
 
 /// What kind of value an expression has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,6 +68,8 @@ pub enum Node {
     Unary(Unary, Box<Expr>),
     Binary(Binary, Box<Expr>, Box<Expr>),
     Select(Box<Expr>, Box<Expr>, Box<Expr>),
+    /// A table of numbers at these coordinates.
+    Table(Arc<Table>, Vec<Expr>),
 }
 
 impl Expr {
@@ -111,6 +115,15 @@ impl Expr {
         Self { span, kind, node, size }
     }
 
+    /// A table at coordinates, as many as it has.
+    pub fn table(table: Arc<Table>, at: Vec<Expr>, kind: Type, span: Span) -> Self {
+        if let Some(values) = at.iter().map(Expr::value).collect::<Option<Vec<f64>>>() {
+            return Self::constant(table.look(Lookup::Value, coordinates(&values), Beyond::Hold), kind, span);
+        }
+        let size = at.iter().fold(1_u32, |size, expr| size.saturating_add(expr.size));
+        Self { span, kind, node: Node::Table(table, at), size }
+    }
+
     /// Whether a species is named in it.
     pub fn names_species(&self) -> bool {
         let mut found = false;
@@ -133,6 +146,12 @@ impl Expr {
                 b.walk(visit);
                 c.walk(visit);
             }
+            Node::Table(_, at) => at.iter().for_each(|expr| expr.walk(visit)),
         }
     }
+}
+
+/// Up to three coordinates, zeros after them.
+pub fn coordinates(values: &[f64]) -> [f64; 3] {
+    std::array::from_fn(|axis| values.get(axis).copied().unwrap_or(0.0))
 }

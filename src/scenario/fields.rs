@@ -35,6 +35,16 @@ pub(super) fn part(checker: &mut Checker<'_>, expr: &Expr) -> Option<Part> {
             let (a, b) = (part(checker, a), part(checker, b));
             join(checker, *operator, a?, b?, expr.span)
         }
+        Node::Table(..) => {
+            checker.report(
+                Diagnostic::error(U108, "a measure cannot look results up in a table")
+                    .at(expr.span, "a table of numbers, over results or bins")
+                    .found("a table of numbers")
+                    .expected("a table at constant coordinates, or a reference")
+                    .help("make a `reference` of the table, and name that in the measure"),
+            );
+            None
+        }
         Node::Time | Node::Select(..) => {
             checker.report(
                 Diagnostic::error(U108, "a measure cannot choose between results")

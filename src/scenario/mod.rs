@@ -9,6 +9,7 @@ mod chemistry;
 mod choice;
 mod collect;
 pub mod condition;
+mod data;
 mod data_files;
 mod equilibrium;
 pub mod expression;

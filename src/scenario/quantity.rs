@@ -70,7 +70,7 @@ impl Checker<'_> {
         );
     }
 
-    fn unknown_unit(&mut self, error: &UnitError, number: &tree::Number, span: Span) {
+    pub(super) fn unknown_unit(&mut self, error: &UnitError, number: &tree::Number, span: Span) {
         let sub = |start: usize, end: usize| {
             let base = span.start as usize;
             Span::new(span.file, base + start, (base + end).min(span.end as usize).max(base + start))

@@ -4,6 +4,7 @@ use super::check::{Allow, Checker};
 use super::collect::Statements;
 use super::model::species_index;
 use super::observe::OUTPUTS;
+use super::scope::Origin;
 use super::{Output, OutputKind, Reference, Solution, Target};
 use crate::catalog::reference::{self as catalogue, ArgumentDimension, Item, Predicts};
 use crate::diagnostic::codes::{D002, D007, M004, M005, M014, M016};
@@ -157,10 +158,12 @@ fn solution<'a>(
         if let Some(item) = catalogue::find(&function.value) {
             return item_solution(checker, item, function, arguments, target);
         }
-        let is_of_scene = checker
-            .scope
-            .get(&function.value)
-            .is_some_and(|entry| matches!(entry.origin, super::scope::Origin::Function(_)));
+        let first = function.value.split('.').next().unwrap_or_default();
+        let is_of_scene = checker.scope.get(first).is_some_and(|entry| match entry.origin {
+            Origin::Data(_) => true,
+            Origin::Function(_) => first == function.value,
+            _ => false,
+        });
         let is_built_in = super::scope::BUILT_IN_FUNCTIONS.contains(&function.value.as_str());
         if !is_of_scene && !is_built_in {
             report_unknown_item(checker, function);

@@ -47,6 +47,8 @@ impl Replicate {
 pub struct Session {
     /// Names and texts of the scene's files.
     pub sources: Vec<(String, String)>,
+    /// Names and hashes of the files of numbers.
+    pub data: Vec<(String, String)>,
     /// `--set name=value`
     pub set: Vec<(String, String)>,
     pub seed: Option<u64>,
@@ -115,17 +117,24 @@ impl Code for Session {
         self.version.put(out);
         self.started.put(out);
         self.facts.put(out);
+        self.data.put(out);
     }
 
     fn take(input: &mut &[u8]) -> Option<Self> {
-        Some(Self {
+        let mut session = Self {
             sources: Code::take(input)?,
+            data: Vec::new(),
             set: Code::take(input)?,
             seed: Code::take(input)?,
             sweep: Code::take(input)?,
             version: Code::take(input)?,
             started: Code::take(input)?,
             facts: Code::take(input)?,
-        })
+        };
+        // Journals of earlier versions end here.
+        if !input.is_empty() {
+            session.data = Code::take(input)?;
+        }
+        Some(session)
     }
 }

@@ -36,6 +36,7 @@ pub fn rule_of(keyword: &str) -> Option<Rule> {
         "output" => Rule::output,
         "reference" => Rule::reference,
         "measure" => Rule::measure,
+        "data" => Rule::data,
         "use" => Rule::r#use,
         "sweep" => Rule::sweep,
         "report" => Rule::report,

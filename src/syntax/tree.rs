@@ -3,9 +3,13 @@
 //! Owns the shapes; `parse` builds them, `format` prints them. May use `source`.
 //! It deliberately knows no physics: a unit is text here, a species is a name.
 
+mod data;
+mod study;
 mod transport;
 
 use crate::source::{Span, Spanned};
+pub use data::{Data, DataColumn};
+pub use study::{Criterion, Expect, Replicates, Report, Sweep, SweepAxis, SweepEntry, SweepValue, Use};
 pub use transport::{
     Boundary, Column, DarcyEntry, DarcyKind, Dispersion, FileEntry, FileValue, Flow, FlowArgument,
     RegionArgument, Source, Well,
@@ -113,95 +117,14 @@ pub enum StatementKind {
     Reference(Reference),
     /// `measure err = l2(profile.A - exact) over x = 0 m .. 1 m at t = 1 d`
     Measure(Measure),
+    /// `data plume = "plume.csv" (x [m], c [mg/L])`
+    Data(Data),
     /// `use "column.lam" as column`
     Use(Use),
     /// `sweep NAME of SCENE { particles 1e3, 1e4 … }`
     Sweep(Sweep),
     /// `report convergence err against particles, step by chi`
     Report(Report),
-}
-
-#[derive(Debug, Clone, PartialEq)]
-pub struct Use {
-    /// Relative to the folder of the file that uses it.
-    pub path: Text,
-    pub alias: Name,
-}
-
-#[derive(Debug, Clone, PartialEq)]
-pub struct Sweep {
-    pub name: Name,
-    /// The alias of a used scene; absent means this one.
-    pub of: Option<Name>,
-    pub entries: Vec<SweepEntry>,
-}
-
-#[derive(Debug, Clone, PartialEq)]
-pub enum SweepEntry {
-    /// `step 1 s, 2 s`
-    Axis(SweepAxis),
-    /// `zip { step 1 s, 2 s  bins 100, 200 }`: axes that go together.
-    Zip(Span, Vec<SweepAxis>),
-    Replicates(Replicates),
-    Seed(Spanned<u64>),
-    /// `common_random_numbers`
-    Common(Span),
-    /// `skip when particles / step > 1e9 /s`
-    Skip(Span, Expr),
-    Expect(Expect),
-}
-
-#[derive(Debug, Clone, PartialEq)]
-pub struct SweepAxis {
-    /// A parameter, or a word such as `particles`; with dots where it is that of a used scene.
-    pub target: Name,
-    pub values: Vec<SweepValue>,
-}
-
-#[derive(Debug, Clone, PartialEq)]
-pub enum SweepValue {
-    /// One value, or a call of `linspace` or `logspace`.
-    One(Expr),
-    /// `1 s .. 16 s by factor 2`
-    Progression { span: Span, range: Range, is_factor: bool, by: Expr },
-}
-
-/// `replicates 8`, or `replicates 8 .. 64 until stderr(err) < 5 % of mean(err)`
-#[derive(Debug, Clone, PartialEq)]
-pub struct Replicates {
-    pub span: Span,
-    pub least: Expr,
-    pub until: Option<(Expr, Criterion)>,
-}
-
-#[derive(Debug, Clone, PartialEq)]
-pub struct Criterion {
-    /// `stderr`
-    pub function: Name,
-    pub measure: Name,
-    pub threshold: Expr,
-    /// `mean`
-    pub of: Name,
-    pub of_measure: Name,
-}
-
-/// `expect order(err, step) in 0.9 .. 1.1 when particles > 1e5`, or `expect leak < 1e-12`
-#[derive(Debug, Clone, PartialEq)]
-pub struct Expect {
-    pub span: Span,
-    pub value: Expr,
-    pub range: Option<Range>,
-    pub when: Option<Expr>,
-}
-
-#[derive(Debug, Clone, PartialEq)]
-pub struct Report {
-    /// `work_precision`, `convergence`
-    pub kind: Name,
-    pub measure: Name,
-    pub against: Vec<Name>,
-    /// What makes a series of its own.
-    pub by: Vec<Name>,
 }
 
 #[derive(Debug, Clone, PartialEq)]

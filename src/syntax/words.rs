@@ -29,13 +29,14 @@ pub const STATEMENT_KEYWORDS: &[&str] = &[
     "output",
     "reference",
     "measure",
+    "data",
     "use",
     "sweep",
     "report",
 ];
 
 /// First words that the language description knows and this version does not run yet.
-pub const LATER_KEYWORDS: &[&str] = &["kernel", "data"];
+pub const LATER_KEYWORDS: &[&str] = &["kernel"];
 
 /// Statements whose body in braces may hold what looks like statements.
 pub const BODY_KEYWORDS: &[&str] = &["sweep"];
@@ -84,6 +85,7 @@ pub fn clause_words(keyword: &str) -> &'static [&'static str] {
         "output" => &["at", "every", "along", "on", "in", "resident", "flux_weighted"],
         "reference" => &["for"],
         "measure" => &["over", "at"],
+        "data" => &["steps", "linear"],
         "use" => &["as"],
         "sweep" => {
             &["of", "replicates", "until", "seed", "common_random_numbers", "skip", "expect", "zip", "factor"]

@@ -39,6 +39,17 @@ pub struct Scene {
     pub title: Option<String>,
     pub citations: Vec<String>,
     pub text: String,
+    /// Files of numbers that the scene reads.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub data: Vec<Data>,
+}
+
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Data {
+    /// From the folder of the scene.
+    pub name: String,
+    /// BLAKE3 of the bytes.
+    pub hash: String,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -111,6 +122,11 @@ impl Footer {
                 title: record.title.clone(),
                 citations: record.citations.clone(),
                 text: record.scene_text.clone(),
+                data: record
+                    .data
+                    .iter()
+                    .map(|(name, hash)| Data { name: name.clone(), hash: hash.clone() })
+                    .collect(),
             },
             plan: PlanIdentity { hash: record.plan_hash.clone() },
             seed: plan.seed,

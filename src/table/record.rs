@@ -16,6 +16,8 @@ pub struct Record {
     pub scene_source: String,
     pub title: Option<String>,
     pub citations: Vec<String>,
+    /// Files of numbers that the scene reads: names from its folder, and hashes.
+    pub data: Vec<(String, String)>,
     pub parameters: Vec<Parameter>,
     /// `(species, quoted text)`
     pub species_docs: Vec<(String, String)>,

@@ -99,6 +99,7 @@ pub fn snapshots() -> Vec<Snapshot> {
 
 pub fn record() -> Record {
     Record {
+        data: Vec::new(),
         scene_name: "two_axes".to_owned(),
         scene_text: "lamella 1\nseed 1 # größer als ASCII\n".to_owned(),
         scene_source: "lamella 1\nseed   1 # größer als ASCII\n".to_owned(),

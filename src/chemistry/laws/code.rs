@@ -4,7 +4,9 @@
 //! deliberately has no branch per particle: an operation is decoded once per lane.
 
 use super::graph::{Graph, Id, Node, apply_binary, apply_unary};
+use crate::data::{Beyond, Lookup, Table};
 use crate::maths::operator::{Binary, Unary};
+use std::sync::Arc;
 
 /// Particles that are evaluated together: enough that decoding an operation costs little, few enough
 /// that the registers of a usual network stay in the first-level cache.
@@ -22,6 +24,8 @@ enum Opcode {
     MultiplyAdd,
     /// `c − a b`, rounded twice.
     SubtractProduct,
+    /// One of the tables.
+    Table(u16, Lookup),
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -36,6 +40,7 @@ struct Instruction {
 pub struct Code {
     instructions: Vec<Instruction>,
     constants: Vec<(u16, f64)>,
+    tables: Vec<Arc<Table>>,
     n_registers: usize,
     /// The register of each result.
     pub outputs: Vec<u16>,
@@ -56,6 +61,7 @@ impl Code {
         Ok(Self {
             instructions: writer.instructions,
             constants: writer.constants,
+            tables: graph.tables.clone(),
             n_registers: writer.n_registers,
             outputs,
         })
@@ -83,8 +89,22 @@ impl Code {
     #[inline(always)]
     pub fn run(&self, registers: &mut [Lane]) {
         for instruction in &self.instructions {
-            step(instruction, registers);
+            match instruction.opcode {
+                Opcode::Table(table, lookup) => {
+                    look(&self.tables[usize::from(table)], lookup, instruction, registers);
+                }
+                _ => step(instruction, registers),
+            }
         }
+    }
+}
+
+/// A table at the coordinates of each lane.
+fn look(table: &Table, lookup: Lookup, instruction: &Instruction, registers: &mut [Lane]) {
+    let at = instruction.operands.map(|operand| registers[usize::from(operand)]);
+    let out = &mut registers[usize::from(instruction.target)];
+    for (l, value) in out.iter_mut().enumerate() {
+        *value = table.look(lookup, at.map(|register| register[l]), Beyond::Hold);
     }
 }
 
@@ -222,6 +242,7 @@ impl<'a> Writer<'a> {
             _ if self.is_fused[at] => {}
             Node::Unary(unary, a) => self.emit(id, Opcode::Unary(unary), &[a]),
             Node::Select(a, b, c) => self.emit(id, Opcode::Select, &[a, b, c]),
+            Node::Table(table, lookup, at) => self.emit(id, Opcode::Table(table, lookup), &at),
             Node::Binary(binary, a, b) => match self.fusions[at] {
                 Some((product, other)) => {
                     let Node::Binary(_, left, right) = self.graph.node(product) else { return };

@@ -4,6 +4,7 @@
 //! deliberately takes one-sided derivatives where there are two: those towards larger arguments.
 
 use super::graph::{Graph, Id, Node};
+use crate::data::Lookup;
 use crate::maths::operator::{Binary, Unary};
 use std::collections::HashMap;
 
@@ -51,7 +52,26 @@ impl Derivative {
                 let (da, db) = (self.known[&a], self.known[&b]);
                 graph.select(condition, da, db)
             }
+            Node::Table(table, Lookup::Value, at) => self.table_rule(graph, table, at),
+            // Nobody asks for a second derivative of a table, and between rows it is zero along each axis.
+            Node::Table(..) => graph.constant(0.0),
         }
+    }
+
+    /// The chain rule over the coordinates of a table.
+    fn table_rule(&self, graph: &mut Graph, table: u16, at: [Id; 3]) -> Id {
+        let n_axes = graph.tables[usize::from(table)].n_axes();
+        let mut sum = graph.constant(0.0);
+        for (axis, id) in at.iter().enumerate().take(n_axes) {
+            let inner = self.known[id];
+            if graph.value(inner) == Some(0.0) {
+                continue;
+            }
+            let slope = graph.slope(table, axis, at);
+            let term = graph.multiply(slope, inner);
+            sum = graph.add(sum, term);
+        }
+        sum
     }
 }
 

@@ -3,10 +3,12 @@
 //! Owns the nodes, their sharing, folding and simplification. May use `maths`. It deliberately assumes
 //! that numbers are finite where it drops a product with zero; what is not finite shows in the rates.
 
+use crate::data::{Beyond, Lookup, Table};
 use crate::maths::interval::Interval;
 use crate::maths::operator::{Binary, Unary};
 use crate::maths::vector;
 use std::collections::HashMap;
+use std::sync::Arc;
 
 /// A node; operands stand before what reads them.
 pub type Id = u32;
@@ -19,6 +21,8 @@ pub enum Node {
     Unary(Unary, Id),
     Binary(Binary, Id, Id),
     Select(Id, Id, Id),
+    /// The value or a slope of a table at coordinates; those beyond its own count for nothing.
+    Table(u16, Lookup, [Id; 3]),
 }
 
 /// Straight-line expressions over inputs; grows, and is never changed.
@@ -26,6 +30,7 @@ pub enum Node {
 pub struct Graph {
     nodes: Vec<Node>,
     known: HashMap<Node, Id>,
+    pub tables: Vec<Arc<Table>>,
 }
 
 impl Graph {
@@ -230,6 +235,22 @@ impl Graph {
         }
     }
 
+    /// The value of a table at coordinates.
+    pub fn table(&mut self, table: &Arc<Table>, at: [Id; 3]) -> Id {
+        let known = self.tables.iter().position(|own| own == table);
+        let idx = known.unwrap_or_else(|| {
+            self.tables.push(table.clone());
+            self.tables.len() - 1
+        });
+        // Expressions have fewer operations than this index has values.
+        self.push(Node::Table(idx as u16, Lookup::Value, at))
+    }
+
+    /// The slope of a table along one of its coordinates.
+    pub fn slope(&mut self, table: u16, axis: usize, at: [Id; 3]) -> Id {
+        self.push(Node::Table(table, Lookup::Slope(axis as u8), at))
+    }
+
     /// Which of the nodes an expression reads, itself included.
     pub fn reached(&self, roots: &[Id]) -> Vec<bool> {
         let mut is_reached = vec![false; self.nodes.len()];
@@ -248,6 +269,7 @@ impl Graph {
             Node::Unary(_, a) => ([a, 0, 0], 1),
             Node::Binary(_, a, b) => ([a, b, 0], 2),
             Node::Select(a, b, c) => ([a, b, c], 3),
+            Node::Table(_, _, at) => (at, 3),
         };
         operands.into_iter().take(n)
     }
@@ -267,6 +289,11 @@ impl Graph {
                 }
                 Node::Binary(binary, a, b) => Interval::binary(binary, read(a), read(b)),
                 Node::Select(a, b, c) => Interval::select(read(a), read(b), read(c)),
+                Node::Table(table, Lookup::Value, _) => {
+                    let (low, high) = self.tables[usize::from(table)].range();
+                    Interval::new(low, high)
+                }
+                Node::Table(..) => Interval::ANY,
             };
         }
         list[root as usize]
@@ -287,6 +314,9 @@ impl Graph {
                     read(b)
                 }
                 Node::Select(_, _, c) => read(c),
+                Node::Table(table, lookup, at) => {
+                    self.tables[usize::from(table)].look(lookup, at.map(read), Beyond::Hold)
+                }
             });
         }
         values

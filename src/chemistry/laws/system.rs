@@ -185,6 +185,7 @@ impl<'a> Builder<'a> {
                 Operation::Binary(Binary::Power, a, b) => self.power(read(a), read(b)),
                 Operation::Binary(binary, a, b) => self.graph.binary(binary, read(a), read(b)),
                 Operation::Select(a, b, c) => self.graph.select(read(a), read(b), read(c)),
+                Operation::Table(ref lookup) => self.graph.table(&lookup.table, lookup.at.map(read)),
             };
             ids.push(id);
             if self.graph.len() > 1 << 20 {

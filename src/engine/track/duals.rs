@@ -5,7 +5,8 @@
 #![allow(clippy::needless_range_loop)] // Loops over lanes are hot.
 
 use super::lanes::{LANES, Lane};
-use crate::plan::tape::{Operation, Tape, dual};
+use crate::data;
+use crate::plan::tape::{Lookup, Operation, Tape, dual};
 
 /// A number and its gradient, per lane.
 #[derive(Debug, Clone)]
@@ -76,8 +77,24 @@ pub fn evaluate<const D: usize>(
                     }
                 }
             }
+            Operation::Table(ref lookup) => table(lookup, registers, &mut result),
         }
         registers.push(result);
+    }
+}
+
+/// A table and its gradient at 64 places.
+fn table<const D: usize>(lookup: &Lookup, registers: &[Dual<D>], result: &mut Dual<D>) {
+    let at = lookup.at.map(|register| &registers[usize::from(register)]);
+    for lane in 0..LANES {
+        let place = at.map(|register| register.value[lane]);
+        result.value[lane] = lookup.table.look(data::Lookup::Value, place, lookup.beyond);
+        for (own, register) in at.iter().enumerate().take(lookup.table.n_axes()) {
+            let slope = lookup.table.slope(own, place);
+            for axis in 0..D {
+                result.slopes[axis][lane] += times(register.slopes[axis][lane], slope);
+            }
+        }
     }
 }
 

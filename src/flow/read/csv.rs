@@ -1,12 +1,12 @@
-//! Comma-separated text (RFC 4180) with a line of names.
+//! Comma-separated tables of a flow with a line of names.
 //!
-//! Owns quoting, comments and numbers. May use the tables. It deliberately guesses nothing: another
-//! separator or a decimal comma is a message and not a try.
+//! Owns the way from records to rows of a flow. May use the records and the tables. It deliberately guesses
+//! nothing: another separator is a message and not a try.
 
-use super::error::{Kind, Place, ReadError};
+use super::error::{Kind, ReadError};
 use super::table::{Frame, Layout, Raw, RowPlaces, axis_of, no_column};
+use crate::data::csv::{Field, Reader, number, text};
 use crate::flow::FaceFlow;
-use std::borrow::Cow;
 
 /// The flow of a table as text. Lines that start with `#` and empty lines are passed over; the first other
 /// line names the columns.
@@ -15,7 +15,7 @@ pub fn flow(bytes: &[u8], layout: &Layout, frame: &Frame) -> Result<FaceFlow, Re
 }
 
 fn raw(bytes: &[u8], layout: &Layout) -> Result<Raw, ReadError> {
-    let mut reader = Reader::new(text(bytes)?);
+    let mut reader = Reader::new(text(bytes)?, ',');
     let Some(names) = reader.record()? else {
         return Err(ReadError::new(Kind::Missing, "the file has no line with the names of columns"));
     };
@@ -62,14 +62,6 @@ fn raw(bytes: &[u8], layout: &Layout) -> Result<Raw, ReadError> {
     Ok(raw)
 }
 
-fn text(bytes: &[u8]) -> Result<&str, ReadError> {
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    std::str::from_utf8(bytes).map_err(|error| {
-        let place = Place::Byte(error.valid_up_to());
-        ReadError::new(Kind::Foreign, "the file is not text in UTF-8").at(place)
-    })
-}
-
 /// The usual slip: one column whose name is the whole line.
 fn check_separator(names: &[Field]) -> Result<(), ReadError> {
     let [only] = names else { return Ok(()) };
@@ -78,134 +70,4 @@ fn check_separator(names: &[Field]) -> Result<(), ReadError> {
     Err(ReadError::new(Kind::Unsupported, format!("the columns are separated by {name}"))
         .at(only.place())
         .help("separate columns by commas, and write decimal points"))
-}
-
-/// A decimal number; what Rust reads beyond that (`inf`, `nan`) is none.
-fn number(field: &Field, column: &str) -> Result<f64, ReadError> {
-    let text = field.text.trim();
-    let is_decimal = text.bytes().all(|c| c.is_ascii_digit() || b"+-.eE".contains(&c));
-    if let Some(number) = text.parse::<f64>().ok().filter(|number| is_decimal && number.is_finite()) {
-        return Ok(number);
-    }
-    let wrong = |message: String| ReadError::new(Kind::Value, message).at(field.place());
-    if text.is_empty() {
-        return Err(wrong(format!("column `{column}` is empty here")));
-    }
-    let error = wrong(format!("`{}` in column `{column}` is no finite number", field.shown()));
-    let with_e = text.replace(['d', 'D'], "e");
-    Err(if text.contains(',') && text.replacen(',', ".", 1).parse::<f64>().is_ok() {
-        error.help("write a decimal point")
-    } else if with_e.parse::<f64>().is_ok() {
-        error.help(format!("write `{with_e}`"))
-    } else {
-        error
-    })
-}
-
-struct Field<'a> {
-    text: Cow<'a, str>,
-    line: u32,
-    column: u32,
-}
-
-impl Field<'_> {
-    fn place(&self) -> Place {
-        Place::Text { line: self.line as usize, column: self.column as usize }
-    }
-
-    /// For messages: short, and nothing that steers a terminal.
-    fn shown(&self) -> String {
-        let clean = |c: char| if c.is_control() { '?' } else { c };
-        self.text.trim().chars().take(40).map(clean).collect()
-    }
-}
-
-struct Reader<'a> {
-    rest: &'a str,
-    line: u32,
-    column: u32,
-}
-
-impl<'a> Reader<'a> {
-    fn new(text: &'a str) -> Self {
-        Self { rest: text, line: 1, column: 1 }
-    }
-
-    /// The fields of the next line that has any; a line may go on in a quoted field.
-    fn record(&mut self) -> Result<Option<Vec<Field<'a>>>, ReadError> {
-        loop {
-            if self.rest.is_empty() {
-                return Ok(None);
-            }
-            let (line, _) = self.rest.split_once('\n').unwrap_or((self.rest, ""));
-            if !line.starts_with('#') && !line.trim().is_empty() {
-                break;
-            }
-            self.skip(line.len());
-            self.end_line();
-        }
-        let mut fields = Vec::new();
-        loop {
-            fields.push(self.field()?);
-            if self.rest.starts_with(',') {
-                self.skip(1);
-                continue;
-            }
-            if !self.end_line() {
-                let message = "text follows a closing quote";
-                return Err(ReadError::new(Kind::Damaged, message)
-                    .at(self.place())
-                    .help("a quote within quotes is written twice"));
-            }
-            return Ok(Some(fields));
-        }
-    }
-
-    fn field(&mut self) -> Result<Field<'a>, ReadError> {
-        let (line, column) = (self.line, self.column);
-        if !self.rest.starts_with('"') {
-            let end = self.rest.find([',', '\n']).unwrap_or(self.rest.len());
-            let text = &self.rest[..end];
-            self.skip(text.strip_suffix('\r').unwrap_or(text).len());
-            return Ok(Field { text: Cow::Borrowed(text.trim_end_matches('\r')), line, column });
-        }
-        let open = self.place();
-        let mut text = String::new();
-        self.skip(1);
-        loop {
-            let Some(end) = self.rest.find('"') else {
-                return Err(ReadError::new(Kind::Damaged, "this quote is never closed").at(open));
-            };
-            text.push_str(&self.rest[..end]);
-            self.skip(end + 1);
-            if !self.rest.starts_with('"') {
-                return Ok(Field { text: Cow::Owned(text), line, column });
-            }
-            text.push('"');
-            self.skip(1);
-        }
-    }
-
-    fn place(&self) -> Place {
-        Place::Text { line: self.line as usize, column: self.column as usize }
-    }
-
-    /// Passes over bytes, which may hold ends of lines inside quotes.
-    fn skip(&mut self, n: usize) {
-        for c in self.rest[..n].chars() {
-            (self.line, self.column) =
-                if c == '\n' { (self.line + 1, 1) } else { (self.line, self.column + 1) };
-        }
-        self.rest = &self.rest[n..];
-    }
-
-    /// Passes over the end of a line, or tells that something else stands here.
-    fn end_line(&mut self) -> bool {
-        let rest = self.rest.strip_prefix('\r').unwrap_or(self.rest);
-        let Some(rest) = rest.strip_prefix('\n').or_else(|| rest.is_empty().then_some(rest)) else {
-            return false;
-        };
-        (self.rest, self.line, self.column) = (rest, self.line + 1, 1);
-        true
-    }
 }

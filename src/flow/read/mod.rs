@@ -7,7 +7,6 @@
 pub mod axes;
 pub mod centred;
 pub mod csv;
-pub mod error;
 pub mod modflow6;
 pub mod npy;
 pub mod parquet;
@@ -18,6 +17,7 @@ pub mod window;
 mod bytes;
 mod npy_header;
 
+pub use crate::data::error;
 pub use centred::Quantity;
 pub use error::{Kind, Place, ReadError};
 

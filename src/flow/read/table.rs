@@ -5,7 +5,8 @@
 
 use super::PorosityOf;
 use super::centred::{Centred, Quantity, check_porosity, into_faces};
-use super::error::{Kind, Place, ReadError};
+use super::error::{Kind, ReadError};
+pub(super) use super::error::{RowPlaces, no_column};
 use super::npy::porosity;
 use super::points::{Bounds, Grid, Points, cells_of_faces};
 use crate::flow::FaceFlow;
@@ -61,23 +62,6 @@ pub(super) struct Raw {
     /// Per row, where a column of normals was asked for.
     pub normals: Vec<u8>,
     pub places: RowPlaces,
-}
-
-/// Where rows are in their file.
-#[derive(Debug, Default)]
-pub(super) enum RowPlaces {
-    #[default]
-    Counted,
-    Lines(Vec<u32>),
-}
-
-impl RowPlaces {
-    pub(super) fn of(&self, row: usize) -> Place {
-        match self {
-            Self::Counted => Place::Row(row + 1),
-            Self::Lines(lines) => Place::Text { line: lines[row] as usize, column: 1 },
-        }
-    }
 }
 
 impl Layout {
@@ -195,15 +179,5 @@ pub(super) fn axis_of(name: &str) -> Option<u8> {
         "y" => Some(1),
         "z" => Some(2),
         _ => None,
-    }
-}
-
-/// The message for a column that is not there, with those that are.
-pub(super) fn no_column<'a>(name: &str, known: impl Iterator<Item = &'a str> + Clone) -> ReadError {
-    let has: Vec<_> = known.clone().map(|name| format!("`{name}`")).collect();
-    let error = ReadError::new(Kind::Missing, format!("there is no column `{name}`"));
-    match crate::diagnostic::did_you_mean(name, known) {
-        Some(near) => error.help(format!("did you mean `{near}`?")),
-        None => error.help(format!("the table has {}", has.join(", "))),
     }
 }

@@ -69,33 +69,22 @@ fn shorten(kinetics: &mut Kinetics) {
     laws.rates.iter().for_each(|rate| is_used[usize::from(*rate)] = true);
     for idx in (0..laws.operations.len()).rev() {
         if is_used[idx] {
-            operands(laws.operations[idx])
-                .into_iter()
-                .flatten()
-                .for_each(|it| is_used[usize::from(it)] = true);
+            laws.operations[idx].reads().into_iter().for_each(|it| is_used[usize::from(it)] = true);
         }
     }
     let place =
         |old: Register| is_used[..usize::from(old)].iter().filter(|is_used| **is_used).count() as Register;
     for operation in &mut laws.operations {
-        *operation = match *operation {
-            Operation::Constant(_) | Operation::Input(_) => *operation,
-            Operation::Unary(operator, a) => Operation::Unary(operator, place(a)),
-            Operation::Binary(operator, a, b) => Operation::Binary(operator, place(a), place(b)),
-            Operation::Select(a, b, c) => Operation::Select(place(a), place(b), place(c)),
-        };
+        match operation {
+            Operation::Constant(_) | Operation::Input(_) => {}
+            Operation::Unary(_, a) => *a = place(*a),
+            Operation::Binary(_, a, b) => [a, b].into_iter().for_each(|it| *it = place(*it)),
+            Operation::Select(a, b, c) => [a, b, c].into_iter().for_each(|it| *it = place(*it)),
+            Operation::Table(lookup) => lookup.at.iter_mut().for_each(|it| *it = place(*it)),
+        }
     }
     laws.rates.iter_mut().for_each(|rate| *rate = place(*rate));
     species::retain_by(&mut laws.operations, &is_used);
-}
-
-fn operands(operation: Operation) -> [Option<Register>; 3] {
-    match operation {
-        Operation::Constant(_) | Operation::Input(_) => [None; 3],
-        Operation::Unary(_, a) => [Some(a), None, None],
-        Operation::Binary(_, a, b) => [Some(a), Some(b), None],
-        Operation::Select(a, b, c) => [Some(a), Some(b), Some(c)],
-    }
 }
 
 struct Needs {
@@ -168,13 +157,13 @@ fn named(kinetics: &Kinetics, reaction: usize) -> Vec<usize> {
         if std::mem::replace(&mut is_seen[usize::from(register)], true) {
             continue;
         }
-        let operation = kinetics.laws.operations[usize::from(register)];
-        if let Operation::Input(input) = operation
+        let operation = &kinetics.laws.operations[usize::from(register)];
+        if let Operation::Input(input) = *operation
             && input >= SPECIES_INPUT
         {
             list.push(usize::from(input - SPECIES_INPUT));
         }
-        open.extend(operands(operation).into_iter().flatten());
+        open.extend(operation.reads());
     }
     list
 }

@@ -235,7 +235,7 @@ struct Walker<'t> {
 
 impl Walker<'_> {
     fn visit(&mut self, idx: usize) {
-        let operation = self.tape.operations[idx];
+        let operation = &self.tape.operations[idx];
         let text = self.text(operation);
         let form = self.form(operation).unwrap_or_else(|| Affine::atom(text.clone()));
         self.texts.push(text);
@@ -243,21 +243,25 @@ impl Walker<'_> {
     }
 
     /// A canonical text; hashed once it grows, so that shared registers stay small.
-    fn text(&self, operation: Operation) -> String {
+    fn text(&self, operation: &Operation) -> String {
         let of = |register: Register| self.texts[usize::from(register)].as_str();
-        let text = match operation {
+        let text = match *operation {
             Operation::Constant(value) => format!("{:016x}", value.to_bits()),
             Operation::Input(column) => format!("in{column}"),
             Operation::Unary(operator, a) => format!("{operator:?}({})", of(a)),
             Operation::Binary(operator, a, b) => format!("{operator:?}({},{})", of(a), of(b)),
             Operation::Select(a, b, c) => format!("Select({},{},{})", of(a), of(b), of(c)),
+            Operation::Table(ref lookup) => {
+                let at: Vec<&str> = lookup.reads().iter().map(|&register| of(register)).collect();
+                format!("{}({})", lookup.table.hash(), at.join(","))
+            }
         };
         if text.len() > 200 { blake3::hash(text.as_bytes()).to_hex().to_string() } else { text }
     }
 
-    fn form(&self, operation: Operation) -> Option<Affine> {
+    fn form(&self, operation: &Operation) -> Option<Affine> {
         let of = |register: Register| &self.forms[usize::from(register)];
-        match operation {
+        match *operation {
             Operation::Constant(value) => Some(Affine { constant: value, terms: BTreeMap::new() }),
             Operation::Unary(Unary::Negate, a) => Some(of(a).times(-1.0)),
             Operation::Binary(Binary::Add, a, b) => Some(of(a).plus(of(b), 1.0)),
@@ -275,7 +279,7 @@ impl Walker<'_> {
                 let indicator = self.indicator(condition);
                 Some(of(otherwise).plus(&indicator, difference))
             }
-            Operation::Input(_) | Operation::Unary(..) | Operation::Binary(..) => None,
+            Operation::Input(_) | Operation::Unary(..) | Operation::Binary(..) | Operation::Table(_) => None,
         }
     }
 

@@ -36,5 +36,6 @@ fn check_one(idx: usize, operation: &Operation, n_inputs: usize) -> Result<(), S
         Operation::Unary(_, a) => written(&[a]),
         Operation::Binary(_, a, b) => written(&[a, b]),
         Operation::Select(a, b, c) => written(&[a, b, c]),
+        Operation::Table(ref lookup) => written(lookup.reads()),
     }
 }

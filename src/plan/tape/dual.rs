@@ -4,6 +4,7 @@
 //! asks at a few states, runs have derivatives compiled into their own program.
 
 use super::{Binary, Operation, Unary};
+use crate::data;
 use crate::maths::scalar;
 
 /// Below this a power with an exponent under one is taken as steep as here.
@@ -14,7 +15,8 @@ pub type Slopes = Vec<(usize, f64)>;
 
 /// Values of all registers and their derivatives by `n` inputs from `first` on, register by register.
 ///
-/// - Equation: the chain rule; `|a|`, `min`, `max` and `if` have the derivative of the side that is taken.
+/// - Equation: the chain rule; `|a|`, `min`, `max` and `if` have the derivative of the side that is taken,
+///   tables that towards larger coordinates.
 /// - Symbols: `values[r]`; `(j, ∂(register r) / ∂(input first + j))` in `slopes[r]`, j rising, those left out
 ///   being zero.
 /// - Range: any inputs; where a derivative is infinite so is the number.
@@ -30,22 +32,29 @@ pub fn differentiate(
     let mut slopes: Vec<Slopes> = Vec::with_capacity(operations.len());
     for operation in operations {
         let at = |register: u16| values[usize::from(register)];
-        // Value, and up to two registers with the partial derivative by each.
-        let (value, parts): (f64, [Option<(u16, f64)>; 2]) = match *operation {
-            Operation::Constant(value) => (value, [None, None]),
-            Operation::Input(input) => (inputs[usize::from(input)], [None, None]),
+        // Value, and up to three registers with the partial derivative by each.
+        let (value, parts): (f64, [Option<(u16, f64)>; 3]) = match *operation {
+            Operation::Constant(value) => (value, [None; 3]),
+            Operation::Input(input) => (inputs[usize::from(input)], [None; 3]),
             Operation::Unary(operator, a) => {
                 let value = operator.apply(at(a));
-                (value, [Some((a, unary(operator, at(a), value))), None])
+                (value, [Some((a, unary(operator, at(a), value))), None, None])
             }
             Operation::Binary(operator, a, b) => {
                 let value = operator.apply(at(a), at(b));
                 let [by_a, by_b] = binary(operator, at(a), at(b), value);
-                (value, [Some((a, by_a)), Some((b, by_b))])
+                (value, [Some((a, by_a)), Some((b, by_b)), None])
             }
             Operation::Select(condition, a, b) => {
                 let taken = if at(condition) != 0.0 { a } else { b };
-                (at(taken), [Some((taken, 1.0)), None])
+                (at(taken), [Some((taken, 1.0)), None, None])
+            }
+            Operation::Table(ref lookup) => {
+                let place = lookup.at.map(at);
+                let value = lookup.table.look(data::Lookup::Value, place, lookup.beyond);
+                let slope = |axis: usize| lookup.table.slope(axis, place);
+                let parts = std::array::from_fn(|axis| Some((*lookup.reads().get(axis)?, slope(axis))));
+                (value, parts)
             }
         };
         values.push(value);

@@ -4,6 +4,7 @@
 //! registers are computed one after the other.
 
 use super::{Binary, Operation, Tape, Unary};
+use crate::data;
 
 /// Points that are evaluated together.
 const LANE: usize = 256;
@@ -20,6 +21,9 @@ impl Tape {
                 Operation::Unary(unary, a) => unary.apply(read(a)),
                 Operation::Binary(binary, a, b) => binary.apply(read(a), read(b)),
                 Operation::Select(condition, a, b) => select(read(condition), read(a), read(b)),
+                Operation::Table(ref lookup) => {
+                    lookup.table.look(data::Lookup::Value, lookup.at.map(read), lookup.beyond)
+                }
             });
         }
         registers.last().copied().unwrap_or(f64::NAN)
@@ -59,6 +63,12 @@ fn evaluate_lane(
         Operation::Select(condition, a, b) => {
             for (((value, &c), &a), &b) in target.iter_mut().zip(read(condition)).zip(read(a)).zip(read(b)) {
                 *value = select(c, a, b);
+            }
+        }
+        Operation::Table(ref lookup) => {
+            for (idx, value) in target.iter_mut().enumerate() {
+                let at = lookup.at.map(|register| read(register)[idx]);
+                *value = lookup.table.look(data::Lookup::Value, at, lookup.beyond);
             }
         }
     }

@@ -50,7 +50,8 @@ impl Visitor for Mentions<'_> {
                 }
             }
             ExprKind::Call { function, .. } => {
-                self.names.insert(function.value.clone());
+                let first = function.value.split('.').next().unwrap_or_default();
+                self.add(first, function.value.contains('.'), function.span);
             }
             _ => {}
         }
@@ -112,7 +113,11 @@ impl Stripping<'_> {
 
 impl Visitor for Stripping<'_> {
     fn expression(&mut self, expr: &mut Expr) {
-        let ExprKind::Path(path) = &mut expr.kind else { return };
+        let path = match &mut expr.kind {
+            ExprKind::Path(path) => path,
+            ExprKind::Call { function, .. } => return self.dotted(function),
+            _ => return,
+        };
         let Some(first) = path.first() else { return };
         if first.value != self.alias {
             if path.len() > 1 {
@@ -146,7 +151,7 @@ impl Visitor for Stripping<'_> {
             return;
         }
         name.span.start += first.len() as u32 + 1;
-        self.check_origin(&rest, name.span);
+        self.check_origin(rest.split('.').next().unwrap_or_default(), name.span);
         name.value = rest;
     }
 }

@@ -15,7 +15,12 @@ pub(super) fn merged(file: &File, used: &Used, all: &[Used]) -> (File, Vec<Diagn
     let own = belonging(file, used, all);
     let has_title = own.iter().any(|statement| matches!(statement.kind, StatementKind::Title(_)));
     let names = definitions(&used.file).into_keys().collect();
-    let outputs: Vec<&str> = OUTPUTS.iter().map(|(word, _)| *word).collect();
+    // First words of dotted paths: results, and tables with their columns.
+    let tables = file.statements.iter().chain(&used.file.statements).filter_map(|it| match &it.kind {
+        StatementKind::Data(data) => Some(data.name.value.as_str()),
+        _ => None,
+    });
+    let outputs: Vec<&str> = OUTPUTS.iter().map(|(word, _)| *word).chain(tables).collect();
     let mut stripping = Stripping {
         alias: &used.alias.value,
         path: &used.path,

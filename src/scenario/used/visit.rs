@@ -74,6 +74,7 @@ pub(super) fn visit(kind: &mut StatementKind, visitor: &mut impl Visitor) {
         | StatementKind::Title(_)
         | StatementKind::Cite(_)
         | StatementKind::Seed(_)
+        | StatementKind::Data(_)
         | StatementKind::Use(_)
         | StatementKind::Report(_) => {}
     }
@@ -146,6 +147,7 @@ fn darcy_entry(entry: &mut DarcyEntry, visitor: &mut impl Visitor) {
 
 fn source(source: &mut Source, visitor: &mut impl Visitor) {
     assignments(&mut source.carried, visitor);
+    visitor.dotted(&mut source.region);
     for argument in &mut source.arguments {
         match argument {
             RegionArgument::Range(it) => range(it, visitor),

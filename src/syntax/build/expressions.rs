@@ -116,7 +116,8 @@ fn path(place: Place, pair: Pair<Rule>) -> Built<Deep> {
 fn call(place: Place, pair: Pair<Rule>) -> Built<Deep> {
     let span = span_at(place, &pair);
     let mut parts = Parts::of(place, pair);
-    let function = parts.name()?;
+    let function = parts.need(Rule::dotted)?;
+    let function = spanned(place, &function);
     let mut arguments = Vec::new();
     let mut depth = 0;
     while let Some(pair) = parts.take(Rule::argument) {

@@ -4,6 +4,7 @@
 //! It deliberately trusts the grammar for order and presence of parts: a part that is not there is
 //! answered with a message, never with a panic.
 
+mod data;
 mod expressions;
 mod quantity;
 mod statements;
@@ -147,7 +148,7 @@ fn is_keyword(rule: Rule) -> bool {
             rule,
             R::kw_initial | R::kw_particles | R::kw_run | R::kw_output | R::kw_reference | R::kw_measure
         )
-        || matches!(rule, R::kw_use | R::kw_sweep | R::kw_report);
+        || matches!(rule, R::kw_data | R::kw_use | R::kw_sweep | R::kw_report);
     let joins = matches!(
         rule,
         R::kw_zones

@@ -4,7 +4,7 @@
 //! It deliberately resolves no name; clauses in free order are counted, nothing else is checked.
 
 use super::expressions::{bare_number, operand};
-use super::{Parts, Place, span_at, spanned, sweeps, transport};
+use super::{Parts, Place, data, span_at, spanned, sweeps, transport};
 use crate::diagnostic::{Diagnostic, codes};
 use crate::source::{Span, Spanned};
 use crate::syntax::climb::Built;
@@ -55,6 +55,7 @@ pub fn kind(mut parts: Parts, rule: Rule) -> Built<StatementKind> {
         Rule::output => S::Output(output(parts)?),
         Rule::reference => S::Reference(reference(parts)?),
         Rule::measure => S::Measure(measure(parts)?),
+        Rule::data => S::Data(data::data(parts)?),
         Rule::r#use => S::Use(Use { path: parts.text()?, alias: parts.name()? }),
         Rule::report => S::Report(sweeps::report(parts)?),
         _ => S::Sweep(sweeps::sweep(parts)?),

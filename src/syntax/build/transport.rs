@@ -150,7 +150,8 @@ pub fn source(parts: &mut Parts) -> Built<Source> {
     let carried = carried(parts)?;
     let pair = parts.need(Rule::region)?;
     let mut region = Parts::of(parts.place, pair);
-    let kind = region.name()?;
+    let kind = region.need(Rule::dotted)?;
+    let kind = spanned(parts.place, &kind);
     let arguments = each(&mut region, Rule::region_argument, |parts| {
         let is_range = parts.pairs.peek().is_some_and(|pair| pair.as_rule() == Rule::range);
         if is_range {

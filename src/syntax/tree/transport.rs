@@ -109,7 +109,7 @@ pub enum Dispersion {
 pub struct Source {
     pub name: Name,
     pub carried: Vec<Assignment>,
-    /// `point`, `box`, `gaussian`, `line`
+    /// `point`, `box`, `gaussian`, `line`, or the name of a table; with dots for one of a used scene.
     pub region: Name,
     pub arguments: Vec<RegionArgument>,
     pub during: Option<Range>,

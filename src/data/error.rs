@@ -1,8 +1,9 @@
 //! What can be wrong with a file of another program.
 //!
-//! Owns the kinds of such mistakes and where they are. May use nothing else of the crate. It deliberately
+//! Owns the kinds of such mistakes and where they are. May use the messages' guesses. It deliberately
 //! knows no file names and no statement: who opened the file adds them.
 
+use crate::diagnostic::did_you_mean;
 use std::fmt;
 
 /// What to do about it differs by kind.
@@ -82,3 +83,30 @@ impl fmt::Display for ReadError {
 }
 
 impl std::error::Error for ReadError {}
+
+/// Where rows are in their file.
+#[derive(Debug, Default)]
+pub enum RowPlaces {
+    #[default]
+    Counted,
+    Lines(Vec<u32>),
+}
+
+impl RowPlaces {
+    pub fn of(&self, row: usize) -> Place {
+        match self {
+            Self::Counted => Place::Row(row + 1),
+            Self::Lines(lines) => Place::Text { line: lines[row] as usize, column: 1 },
+        }
+    }
+}
+
+/// The message for a column that is not there, with those that are.
+pub fn no_column<'a>(name: &str, known: impl Iterator<Item = &'a str> + Clone) -> ReadError {
+    let has: Vec<_> = known.clone().map(|name| format!("`{name}`")).collect();
+    let error = ReadError::new(Kind::Missing, format!("there is no column `{name}`"));
+    match did_you_mean(name, known) {
+        Some(near) => error.help(format!("did you mean `{near}`?")),
+        None => error.help(format!("the table has {}", has.join(", "))),
+    }
+}
