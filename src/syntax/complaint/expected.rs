@@ -84,10 +84,12 @@ pub fn expected_words(rule: Rule) -> Vec<String> {
         R::name | R::dotted | R::term | R::species_item | R::species_list | R::assignment | R::target => {
             one("a name")
         }
-        R::reactants | R::products | R::target_kind => one("a name"),
+        R::reactants | R::products | R::target_kind | R::share => one("a name"),
         R::kind | R::output_kind | R::shape | R::boundary_kind => one("a kind"),
         R::setting | R::chemistry_setting => one("a setting"),
-        R::rate | R::signed_number | R::corner => one(VALUE),
+        R::rate | R::signed_number | R::corner | R::region_argument | R::sweep_value | R::progression => {
+            one(VALUE)
+        }
         R::argument | R::argument_name => one("an argument"),
         R::label | R::zone => one("a name with `:`"),
         R::zone_field => one("a field such as `rate`"),
@@ -98,7 +100,7 @@ pub fn expected_words(rule: Rule) -> Vec<String> {
         R::text => one("a text in quotes"),
         R::bare_number | R::count | R::counts => one("a number"),
         R::unit => one("a unit"),
-        R::axis_name | R::axis => ["`x`", "`y`", "`z`"].map(str::to_owned).to_vec(),
+        R::axis_name | R::axis | R::patch => ["`x`", "`y`", "`z`"].map(str::to_owned).to_vec(),
         R::side => one("a side such as `left`"),
         R::arrow => one("`->`"),
         R::rate_sign => one("`@`"),
@@ -121,18 +123,13 @@ pub fn expected_words(rule: Rule) -> Vec<String> {
         R::dispersion_part | R::dispersion_word => one("a part such as `longitudinal 0.5 m`"),
         R::medium_part => one("a property such as `porosity 0.3`"),
         R::carried => one("a name with `=`"),
-        R::patch => ["`x`", "`y`", "`z`"].map(str::to_owned).to_vec(),
-        R::side_rate | R::valued | R::valued_word => one("a further word"),
+        R::data_rule | R::side_rate | R::valued | R::valued_word => one("a further word"),
         R::region => one("a region such as `at point(1 m, 2 m)`"),
-        R::region_argument => one(VALUE),
         R::column => one("a column such as `t [s]`"),
         R::column_unit => one("a unit in brackets such as `[mg/L]`"),
-        R::data_rule => one("a further word"),
-        R::share => one("a name"),
         R::times_sign => one("`x`"),
         R::replicates | R::sweep_seed | R::common | R::skip | R::expect | R::zip => Vec::new(),
         R::sweep_axis => one("an axis such as `step 1 s, 2 s`"),
-        R::sweep_value | R::progression => one(VALUE),
         R::less => one("`<`"),
         R::zone_end | R::comma => one("`,`"),
         R::colon => one("`:`"),
