@@ -3,85 +3,12 @@
 //! Bounds: four times the sampling noise that the run itself reports for its bins, or 1 % where the number of
 //! particles makes the noise smaller than that. The closed forms stand in the scenes.
 
-use lamella::engine::snapshot::{Outcome, Snapshot, Values};
-use lamella::engine::{Settings as EngineSettings, Unattended};
-use lamella::measure::Evaluated;
-use lamella::plan::compile::Options;
-use lamella::plan::{OutputKind, Plan};
+#[path = "support/scene.rs"]
+mod scene;
+
+use lamella::plan::OutputKind;
 use lamella::scenario::Settings;
-use lamella::source::Sources;
-
-struct Finished {
-    plan: Plan,
-    snapshots: Vec<Snapshot>,
-    evaluated: Evaluated,
-    outcome: Outcome,
-}
-
-/// Measured numbers, shown by `cargo test -- --nocapture`.
-#[expect(clippy::print_stdout, reason = "tests report what they measured")]
-fn tell(report: &str) {
-    println!("{report}");
-}
-
-fn run(text: &str) -> Finished {
-    run_with(text, &Settings::default())
-}
-
-fn run_with(text: &str, settings: &Settings) -> Finished {
-    let sources = Sources::single("scene.lam", text);
-    let checked = lamella::check(sources, settings, &Options::default());
-    let compiled = checked.compiled.unwrap_or_else(|| panic!("no plan: {:#?}", checked.diagnostics));
-    let mut snapshots: Vec<Snapshot> = Vec::new();
-    let settings = EngineSettings::default();
-    let outcome = lamella::engine::run(&compiled.plan, &settings, &Unattended, &mut |snapshot| {
-        snapshots.push(snapshot);
-        Ok(())
-    })
-    .expect("the scene runs");
-    let evaluated = lamella::measure::evaluate(&compiled.plan, &compiled.evaluation, &snapshots, &outcome)
-        .expect("results and references fit");
-    Finished { plan: compiled.plan, snapshots, evaluated, outcome }
-}
-
-impl Finished {
-    fn measure(&self, name: &str) -> f64 {
-        let found = self.evaluated.measures.iter().find(|measure| measure.name == name);
-        let value = found.expect("the scene has the measure").value;
-        tell(&format!("{name} {value:.3e}"));
-        value
-    }
-
-    /// Times and numbers of the only row of a species in outputs of a kind, by place.
-    fn rows(&self, kind: OutputKind, species: usize, place: Option<&str>) -> Vec<(f64, Vec<f64>)> {
-        let mut found = Vec::new();
-        for snapshot in &self.snapshots {
-            let output = &self.plan.outputs[snapshot.output_idx];
-            let Values::Rows(rows) = &snapshot.values else { continue };
-            if output.kind != kind {
-                continue;
-            }
-            let places = self.plan.places(output);
-            for row in rows.get(species).into_iter().flatten() {
-                if place.is_none_or(|place| places[usize::from(row.place)] == place) {
-                    found.push((snapshot.t / 86_400.0, row.numbers.clone()));
-                }
-            }
-        }
-        found
-    }
-
-    fn keeps_its_books(&self) {
-        let worst = self.outcome.mass_defect.iter().fold(0.0, |worst: f64, defect| worst.max(*defect));
-        assert!(worst < 1e-12, "mass in = inside + out to {worst:e}");
-    }
-}
-
-/// The text with a piece replaced that must be there.
-fn edited(text: &str, from: &str, to: &str) -> String {
-    assert!(text.contains(from), "the scene has no `{from}`");
-    text.replace(from, to)
-}
+use scene::{Finished, edited, run, run_with, tell};
 
 /// 200 000 particles: what is left of 0.52 of them is known to 0.2 %.
 #[test]

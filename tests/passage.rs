@@ -52,6 +52,7 @@ fn scene(
             is_mobile: true,
             initial: constant(0.0),
         }],
+        is_of_fluid: false,
         decay: None,
         sub_steps: None,
         interfaces: vec![],

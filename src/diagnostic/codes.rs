@@ -127,7 +127,7 @@ codes! {
     M023 "an output that has no meaning in equilibrium",
     M024 "a model of activities that lacks what it needs",
     M025 "mass particles cannot do this yet",
-    M026 "fluid particles cannot do this yet",
+    M026 "fluid particles cannot do this",
     M027 "parts of a side that do not fit",
     M028 "a place outside of the domain",
     M029 "a flow that makes or loses water",

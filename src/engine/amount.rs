@@ -70,19 +70,23 @@ pub fn worse(a: f64, b: f64) -> f64 {
     if a.is_nan() || a > b { a } else { b }
 }
 
-/// Largest relative change per component over its columns, apart from what reactions `added`.
+/// Largest relative change per component over its columns, apart from what reactions `added` and what each column
+/// `gained` as particles came and went.
 pub fn defects<const D: usize>(
     program: &Program<D>,
     before: &[Amount],
     added: &[Added],
     sums: &[f64],
+    gained: impl Fn(usize) -> Added,
 ) -> Vec<f64> {
     let n_slots = program.roles.len();
     let of_component = |component: usize| {
         let columns = (0..n_slots).filter(|&slot| program.roles[slot] != Role::Mean);
         let of_slot = |slot: usize| {
             let column = component * n_slots + slot;
-            Amount::defect_of(sums[column], &before[column], added[component])
+            let mut all = added[component];
+            all.add(gained(column));
+            Amount::defect_of(sums[column], &before[column], all)
         };
         columns.map(of_slot).fold(0.0, worse)
     };

@@ -4,14 +4,21 @@
 //! time 0 every stored zone has the value of the expression.
 
 use super::error::RunError;
+use super::mass::place::Cells;
 use super::parallel;
 use super::place::{Strata, place};
 use super::program::Program;
+use super::water;
 use crate::plan::{Component, Plan, Species};
 use crate::state::particles::{BLOCK, Block, state_bytes};
 
 /// All blocks of the run.
-pub fn blocks<const D: usize>(program: &Program<D>) -> Result<Vec<Block<D>>, RunError> {
+///
+/// They lie as dense as the water in `cells` where there are any.
+pub fn blocks<const D: usize>(
+    program: &Program<D>,
+    cells: Option<&Cells<D>>,
+) -> Result<Vec<Block<D>>, RunError> {
     let plan = program.plan;
     let n_particles = plan.particles.count;
     let bytes = state_bytes(n_particles, D, program.n_columns());
@@ -22,7 +29,13 @@ pub fn blocks<const D: usize>(program: &Program<D>) -> Result<Vec<Block<D>>, Run
         let n_in_block = (n_particles - idx * BLOCK as u64).min(BLOCK as u64) as usize;
         let mut block = Block::<D>::new(idx, n_in_block, program.n_columns())
             .map_err(|_| RunError::OutOfMemory { bytes })?;
-        place(&plan.axes, plan.particles.placement, &strata, plan.seed, &mut block);
+        match cells {
+            None => place(&plan.axes, plan.particles.placement, &strata, plan.seed, &mut block),
+            Some(cells) => water::start::place(plan, cells, &mut block),
+        }
+        if plan.transport.is_some() {
+            block.ids = (block.first()..block.first() + n_in_block as u64).collect();
+        }
         fill(program, &mut block)?;
         Ok(block)
     });

@@ -3,6 +3,7 @@
 //! Owns the run: blocks of particles through the stages of the plan. May use the plan, `state` and
 //! `maths`. It deliberately knows no files and prints nothing.
 
+mod ahead;
 mod amount;
 mod average;
 mod clock;
@@ -25,6 +26,7 @@ pub mod snapshot;
 mod step;
 pub mod track;
 mod walk;
+mod water;
 
 use crate::plan::Plan;
 pub use control::{Control, Settings, Unattended};
@@ -58,7 +60,7 @@ fn run_here(
     control: &dyn Control,
     sink: &mut (dyn FnMut(Snapshot) -> Result<(), RunError> + Send),
 ) -> Result<Outcome, RunError> {
-    if plan.transport.is_some() {
+    if plan.carries_mass() {
         return match plan.axes.len() {
             1 => mass::run::<1>(plan, settings, control, sink),
             2 => mass::run::<2>(plan, settings, control, sink),

@@ -75,6 +75,10 @@ pub struct Program<'a, const D: usize> {
     pub passes: Vec<Work>,
     /// How species follow from components at the instant that is looked at.
     pub species: Vec<Species>,
+    /// Water of a particle: m, m² or m³ over the axes of the scene.
+    pub volume: f64,
+    /// Water of each bin of the averages over that of the mean one; nothing where all have the same.
+    pub uneven: Option<Vec<f64>>,
     n_mobile: usize,
 }
 
@@ -99,7 +103,6 @@ impl<'a, const D: usize> Program<'a, D> {
         let (mean_weights, carried_fraction) = weights(plan.mixing.as_ref(), &terms, &roles);
         let mut program = Self {
             plan,
-            grid,
             rules,
             mover,
             roles,
@@ -108,6 +111,9 @@ impl<'a, const D: usize> Program<'a, D> {
             carried_fraction,
             passes: Vec::new(),
             species: plan.species.clone(),
+            volume: plan.particles.volume,
+            uneven: None,
+            grid,
             n_mobile: plan.n_mobile(),
         };
         program.passes = program.passes_of(&plan.stages);
@@ -121,6 +127,24 @@ impl<'a, const D: usize> Program<'a, D> {
 
     pub fn n_columns(&self) -> usize {
         self.n_components() * self.roles.len()
+    }
+
+    /// Particles per bin, over all bins.
+    pub fn per_bin(&self) -> f64 {
+        self.plan.particles.count as f64 / self.grid.n_bins() as f64
+    }
+
+    /// Particles that make up the water of a bin.
+    pub fn expected(&self, bin: usize) -> f64 {
+        self.per_bin() * self.uneven.as_ref().map_or(1.0, |water| water[bin])
+    }
+
+    /// Sum over bins, each by its water over that of the mean one.
+    pub fn sum_of_bins(&self, values: &[f64]) -> f64 {
+        match &self.uneven {
+            None => values.iter().sum(),
+            Some(water) => values.iter().zip(water).map(|(value, water)| value * water).sum(),
+        }
     }
 
     /// Whether particles see means at all.
@@ -149,7 +173,8 @@ impl<'a, const D: usize> Program<'a, D> {
     /// Turns the stages of the plan into passes, leaving out what has nothing to do.
     fn passes_of(&self, stages: &[Stage]) -> Vec<Work> {
         let relaxes = self.roles.iter().any(|role| !matches!(role, Role::Fixed));
-        let moves = self.mover.is_moving();
+        let is_tracked = self.plan.transport.is_some();
+        let moves = is_tracked || self.mover.is_moving();
         let reacts = self.plan.reacts_in_steps();
         let is_coupled = reacts && self.is_coupled();
         let averages = relaxes || is_coupled;
@@ -158,7 +183,7 @@ impl<'a, const D: usize> Program<'a, D> {
             Stage::React => Work { reacts, ..Work::default() },
             Stage::FusedReact => Work { mixes: relaxes, reacts, ..Work::default() },
             Stage::Move => Work { moves, ..Work::default() },
-            Stage::Bound => Work { bounds: moves, ..Work::default() },
+            Stage::Bound => Work { bounds: moves && !is_tracked, ..Work::default() },
             Stage::Average => Work { averages, ..Work::default() },
             Stage::FusedStep => {
                 Work { mixes: relaxes, reacts: reacts && !is_coupled, moves, bounds: moves, averages }
@@ -219,6 +244,9 @@ pub fn unsound(what: &str) -> RunError {
 }
 
 fn check_scalars(plan: &Plan) -> Result<(), RunError> {
+    if plan.transport.is_some() && plan.stages.contains(&Stage::FusedStep) {
+        return Err(unsound("parcels on tracks do not move in one pass with other work"));
+    }
     let time = &plan.time;
     let last = time.duration - time.step * time.n_steps.saturating_sub(1) as f64;
     // Twice the slack, since the last step is itself a difference of rounded numbers.

@@ -194,15 +194,15 @@ impl<const D: usize> Reaction<'_, D> {
         for (values, bins) in bench.values[program.n_components()..].iter_mut().zip(self.immobile) {
             for idx in 0..n {
                 let slot = slots[idx] as usize;
-                values[idx] = if counts[slot] > 0.0 { bins[slot] * self.share(counts[slot]) } else { 0.0 };
+                values[idx] =
+                    if counts[slot] > 0.0 { bins[slot] * self.share(slot, counts[slot]) } else { 0.0 };
             }
         }
     }
 
     /// Fluid of a bin against that of the particles in it: what lives in the bin is shared out among them.
-    fn share(&self, n_particles: f64) -> f64 {
-        let mean = self.program.plan.particles.count as f64 / self.program.grid.n_bins() as f64;
-        mean / n_particles
+    fn share(&self, bin: usize, n_particles: f64) -> f64 {
+        self.program.expected(bin) / n_particles
     }
 
     /// Adds what the reaction changed to every zone.

@@ -5,12 +5,10 @@
 
 use super::average::Means;
 use super::error::RunError;
-use super::observe::{Draws, Instant};
-use super::program::{Program, Role, Work, unsound};
+use super::initial;
+use super::program::{Program, Work, unsound};
 use super::react::{Added, Bench, Reaction, Span, add_work};
 use super::run::Run;
-use super::schedule::{Due, step_length};
-use super::{initial, parallel};
 use crate::chemistry::{Batch, Observed, Reactor, Reversal, Scratch, Why, Work as Labour};
 use crate::diagnostic::precise;
 use crate::plan::Plan;
@@ -20,7 +18,7 @@ use std::sync::{Mutex, PoisonError};
 
 /// The chemistry of a run.
 pub struct Reactions {
-    reactor: Option<Reactor>,
+    pub reactor: Option<Reactor>,
     /// For bins without particles: only what lives there reacts, with itself.
     resting: Option<Reactor>,
     observed: Option<Observed>,
@@ -29,7 +27,7 @@ pub struct Reactions {
     pub reversal: Option<Reversal>,
     /// The same as observations see it.
     pub shown: Option<Reversal>,
-    is_symmetric: bool,
+    pub is_symmetric: bool,
     /// Over which the particles still have to react, at the positions that they have now.
     spans: Vec<Span>,
     step: Span,
@@ -130,7 +128,7 @@ impl Reactions {
             is_symmetric: splitting == Some(Splitting::Strang),
             spans: Vec::new(),
             step: Span { t: 0.0, dt: 0.0 },
-            immobile_before: immobile.iter().map(|bins| bins.iter().sum()).collect(),
+            immobile_before: immobile.iter().map(|bins| program.sum_of_bins(bins)).collect(),
             immobile,
             added: vec![Added::default(); plan.components.len()],
             peaks: vec![0.0; plan.components.len()],
@@ -213,11 +211,10 @@ impl Reactions {
         }
         let stride = self.immobile.len();
         let n_bins = program.grid.n_bins();
-        let mean = program.plan.particles.count as f64 / n_bins as f64;
         for (idx, bins) in self.immobile.iter_mut().enumerate() {
             let changes = sums.iter().skip(idx).step_by(stride);
-            for (bin, change) in bins[..n_bins].iter_mut().zip(changes) {
-                let (before, change) = (*bin, change / mean);
+            for ((number, bin), change) in bins[..n_bins].iter_mut().enumerate().zip(changes) {
+                let (before, change) = (*bin, change / program.expected(number));
                 *bin = before + change;
                 // What is used up may miss zero by rounding; more than that would be a loss, and shows.
                 if *bin < 0.0 && -*bin <= 1e-12 * before.abs() {
@@ -368,46 +365,13 @@ impl<const D: usize> Run<'_, D> {
                 return Err(RunError::Chemistry { step: step.max(1), particle: 0, what, why });
             }
         }
-        let mean = program.plan.particles.count as f64 / n_bins as f64;
         for (idx, bins) in reactions.immobile.iter_mut().enumerate() {
             for (&bin, &after) in empty.iter().zip(&values[program.n_components() + idx]) {
-                let change = (after - bins[bin]) * mean;
+                let change = (after - bins[bin]) * program.expected(bin);
                 reactions.added[program.n_components() + idx].add(Added { sum: change, size: change.abs() });
                 bins[bin] = after;
             }
         }
         Ok(())
-    }
-
-    /// The state at a time within the next step, if what reacts has to be taken there: a copy that goes
-    /// part of the step. Otherwise nothing, and a look-through does.
-    pub fn ahead(&self, due: &Due) -> Result<Option<Self>, RunError> {
-        if self.reactions.reactor.is_none() || due.fraction == 0.0 {
-            return Ok(None);
-        }
-        let plan_step = step_length(&self.program.plan.time, due.steps);
-        let Instant::Between(between) = self.instant(due) else { return Ok(None) };
-        let mut ahead = self.copy();
-        let t = due.steps as f64 * self.program.plan.time.step;
-        ahead.reactions.begin_step(t, due.fraction * plan_step);
-        if ahead.reactions.is_symmetric {
-            ahead.settle_pending(due.steps)?;
-        }
-        let program = &self.program;
-        let draws = Draws { width: self.width, walk: &self.walk, bridge: &self.bridge };
-        parallel::for_each(&mut ahead.blocks.iter_mut().collect::<Vec<_>>(), &|_, block| {
-            between.carry(program, &draws, block);
-        });
-        ahead.is_averaged = false;
-        if program.is_coupled() {
-            let still = program.mover.leap(0.0, 0.0);
-            ahead.pass(Work { averages: true, ..Work::default() }, due.steps, still, &[])?;
-        }
-        if program.roles.iter().any(|role| !matches!(role, Role::Fixed)) {
-            ahead.pending = Some(between.decays.clone());
-        }
-        ahead.reactions.end_step();
-        ahead.settle_pending(due.steps)?;
-        Ok(Some(ahead))
     }
 }

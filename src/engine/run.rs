@@ -12,15 +12,17 @@ use super::error::RunError;
 use super::observe::{self, Instant, Lab};
 use super::parallel::{self, Pool};
 use super::program::{Program, Work};
-use super::react::Span;
+use super::react::{Added, Span};
 use super::reactions::{Reactions, Yield};
 use super::schedule::{Due, schedule, step_length};
 use super::snapshot::{Outcome, Snapshot};
 use super::step::{OnBlock, Pass, Scratch, Trouble};
+use super::track::tracker::Steps;
+use super::water::Water;
 use super::{initial, walk::Leap};
 use crate::maths::wide::Width;
 use crate::plan::Plan;
-use crate::state::particles::{BLOCK, Block, state_bytes};
+use crate::state::particles::{Block, state_bytes};
 use crate::state::stream::{Purpose, Stream};
 
 /// Relative change of a carried amount that stops a run.
@@ -54,6 +56,8 @@ pub struct Run<'a, const D: usize> {
     /// Smallest value allowed per component.
     pub limits: Vec<f64>,
     pub reactions: Reactions,
+    /// What moves particles that come and go; the walk of the program moves all others.
+    pub water: Option<Water<D>>,
 }
 
 /// Sums and the first trouble of consecutive blocks.
@@ -117,15 +121,20 @@ impl<'a, const D: usize> Run<'a, D> {
     fn new(plan: &'a Plan, settings: &Settings) -> Result<Self, RunError> {
         let mut program = Program::<D>::new(plan)?;
         program.mover.takes_half_draws = settings.takes_half_draws;
-        let mut blocks = initial::blocks(&program)?;
+        let width = if settings.is_narrow { Width::baseline() } else { Width::widest() };
+        let water = match plan.transport {
+            Some(_) => Some(Water::new(&mut program, settings, width)?),
+            None => None,
+        };
+        let mut blocks = initial::blocks(&program, water.as_ref().and_then(Water::cells))?;
         let before = amount::amounts(&blocks, program.n_columns());
         let reactions = Reactions::new(&program, &mut blocks)?;
-        let limits = limits(&program, &before);
+        let limits = limits(&program, &before, water.as_ref().map_or(&[], |water| &water.ranges));
         let blocks_per_group = average::blocks_per_group(plan.particles.count, program.grid.n_slots());
         let n_groups = blocks.len().div_ceil(blocks_per_group);
         let groups = (0..n_groups).map(|_| Group::default()).collect();
         Ok(Self {
-            width: if settings.is_narrow { Width::baseline() } else { Width::widest() },
+            width,
             walk: Stream::new(plan.seed, Purpose::Walk),
             bridge: Stream::new(plan.seed, Purpose::Bridge),
             means: Means::default(),
@@ -141,6 +150,7 @@ impl<'a, const D: usize> Run<'a, D> {
             invariants: conserved::invariants(plan),
             limits,
             reactions,
+            water,
         })
     }
 
@@ -163,6 +173,7 @@ impl<'a, const D: usize> Run<'a, D> {
             invariants: self.invariants.clone(),
             limits: self.limits.clone(),
             reactions: self.reactions.copy(),
+            water: self.water.as_ref().map(Water::copy),
         }
     }
 
@@ -184,6 +195,11 @@ impl<'a, const D: usize> Run<'a, D> {
         for work in passes {
             let mixes = work.mixes && self.pending.is_some();
             let work = Work { mixes, ..work };
+            if work.moves && self.water.is_some() {
+                let t = step as f64 * self.program.plan.time.step;
+                self.flow_on(Steps { first: step, end: step + 1, t, dt })?;
+                continue;
+            }
             if work.reacts && self.program.is_coupled() {
                 self.react_in_bins(work, step)?;
                 continue;
@@ -197,6 +213,15 @@ impl<'a, const D: usize> Run<'a, D> {
             }
         }
         self.reactions.end_step();
+        Ok(())
+    }
+
+    /// A step of particles that come and go: a stage of its own.
+    pub(super) fn flow_on(&mut self, steps: Steps) -> Result<(), RunError> {
+        let Some(water) = &mut self.water else { return Ok(()) };
+        water.flow_on(&mut self.blocks, steps)?;
+        self.groups.resize_with(self.blocks.len().div_ceil(self.blocks_per_group), Group::default);
+        self.is_averaged = false;
         Ok(())
     }
 
@@ -296,12 +321,17 @@ impl<'a, const D: usize> Run<'a, D> {
     /// lives in bins, and of what reactions conserve.
     fn defects(&self, sums: &[f64]) -> Vec<f64> {
         let added = &self.reactions.added;
-        let mut defects = amount::defects(&self.program, &self.before, added, sums);
+        let gained = |column: usize| match &self.water {
+            Some(water) => water.book.whole(column),
+            None => Added::default(),
+        };
+        let mut defects = amount::defects(&self.program, &self.before, added, sums, gained);
         let in_bins = self.reactions.immobile_before.iter().zip(&self.reactions.immobile);
         for ((before, bins), &added) in in_bins.zip(&added[self.program.n_components()..]) {
-            let amount = |sum: f64| Amount::of_bins(sum * self.per_bin());
-            let after: f64 = bins[..self.program.grid.n_bins()].iter().sum();
-            defects.push(Amount::defect_of(after * self.per_bin(), &amount(*before), added));
+            let per_bin = self.program.per_bin();
+            let after = self.program.sum_of_bins(&bins[..self.program.grid.n_bins()]);
+            let before = Amount::of_bins(before * per_bin);
+            defects.push(Amount::defect_of(after * per_bin, &before, added));
         }
         let Reactions { added, peaks, .. } = &self.reactions;
         let reacted = conserved::defects(&self.invariants, added, peaks, &self.initial_sizes());
@@ -320,11 +350,6 @@ impl<'a, const D: usize> Run<'a, D> {
         }
     }
 
-    /// Particles per bin, on average.
-    fn per_bin(&self) -> f64 {
-        self.program.plan.particles.count as f64 / self.program.grid.n_bins() as f64
-    }
-
     fn component_name(&self, idx: usize) -> String {
         self.program.plan.components[idx].name.clone()
     }
@@ -334,7 +359,7 @@ impl<'a, const D: usize> Run<'a, D> {
         let program = &self.program;
         let n_slots = program.roles.len();
         let carried = (0..program.n_components()).map(|component| self.before[component * n_slots].size);
-        let in_bins = self.reactions.immobile_before.iter().map(|sum| sum * self.per_bin());
+        let in_bins = self.reactions.immobile_before.iter().map(|sum| sum * self.program.per_bin());
         carried.chain(in_bins).collect()
     }
 
@@ -346,7 +371,7 @@ impl<'a, const D: usize> Run<'a, D> {
             for (column_idx, column) in block.columns.iter().enumerate() {
                 if let Some(idx) = column.iter().position(|value| !value.is_finite()) {
                     let component = self.component_name(column_idx / n_slots);
-                    let particle = block.first() + idx as u64;
+                    let particle = block.number(idx);
                     return RunError::NonFiniteConcentration { step: step + 1, particle, component };
                 }
             }
@@ -366,8 +391,8 @@ impl<'a, const D: usize> Run<'a, D> {
                 let what = self.reactions.explain(&self.program, why);
                 RunError::Chemistry { step: step.max(1), particle, what, why }
             }
-            Trouble::Negative { component, first } => {
-                let (particle, value) = self.find_below(component, first);
+            Trouble::Negative { component, block, first } => {
+                let (particle, value) = self.find_below(component, block, first);
                 // A pass that relaxes and then averages does the relaxation of the step before.
                 let step = if work.averages { step } else { step + 1 };
                 RunError::NegativeConcentration {
@@ -380,19 +405,18 @@ impl<'a, const D: usize> Run<'a, D> {
         }
     }
 
-    /// The first particle of the chunk that starts at `first` with a value below the limit.
-    fn find_below(&self, component: usize, first: u64) -> (u64, f64) {
+    /// The first particle of a block, from its place `first` on, with a value below the limit.
+    fn find_below(&self, component: usize, block: usize, first: usize) -> (u64, f64) {
         let n_slots = self.program.roles.len();
         let limit = self.limits[component];
-        let block = &self.blocks[(first / BLOCK as u64) as usize];
-        let start = (first - block.first()) as usize;
+        let block = &self.blocks[block];
         let columns = &block.columns[component * n_slots..][..n_slots];
         let found = columns.iter().filter_map(|column| {
-            let offset = column[start..].iter().position(|&value| value < limit)?;
-            Some((offset, column[start + offset]))
+            let offset = column[first..].iter().position(|&value| value < limit)?;
+            Some((offset, column[first + offset]))
         });
         let (offset, value) = found.min_by_key(|&(offset, _)| offset).unwrap_or((0, f64::NAN));
-        (first + offset as u64, value)
+        (block.number(first + offset), value)
     }
 
     /// Does what is pending and compares the amounts.
@@ -405,7 +429,8 @@ impl<'a, const D: usize> Run<'a, D> {
 }
 
 /// Smallest value allowed per component: none where the initial values are negative somewhere.
-fn limits<const D: usize>(program: &Program<D>, before: &[Amount]) -> Vec<f64> {
+/// `ranges` are those of what may come in later.
+fn limits<const D: usize>(program: &Program<D>, before: &[Amount], ranges: &[(f64, f64)]) -> Vec<f64> {
     let n_slots = program.roles.len();
     let kinetics = program.plan.chemistry.as_ref().and_then(|chemistry| chemistry.kinetics.as_ref());
     let reactions = kinetics.filter(|_| program.plan.reacts_in_steps()).map(|kinetics| &kinetics.reactions);
@@ -416,8 +441,9 @@ fn limits<const D: usize>(program: &Program<D>, before: &[Amount]) -> Vec<f64> {
     (0..program.n_components())
         .map(|component| {
             let amounts = &before[component * n_slots..][..n_slots];
-            let lowest = amounts.iter().map(|amount| amount.lowest).fold(f64::INFINITY, f64::min);
-            let highest = amounts.iter().map(|amount| amount.highest).fold(0.0, f64::max);
+            let later = ranges.get(component).copied().unwrap_or((f64::INFINITY, 0.0));
+            let lowest = amounts.iter().map(|amount| amount.lowest).fold(later.0, f64::min);
+            let highest = amounts.iter().map(|amount| amount.highest).fold(later.1, f64::max);
             // What reacts may be below zero in one of the zones, and is not in the particle.
             if lowest < 0.0 || reacts(component) { f64::NEG_INFINITY } else { -ROUNDING * highest }
         })

@@ -6,6 +6,7 @@ use crate::plan::tape::{Operation, Tape};
 use crate::plan::{Compiled, Options, Stage, Time};
 use crate::scenario;
 use crate::source::Sources;
+use crate::state::particles::BLOCK;
 
 /// Two conservative fields in two zones that relax, on several blocks; every step is one fused pass
 /// unless the stages are changed.

@@ -10,7 +10,7 @@ use super::react::{Bench, Chunk, Reaction};
 use super::walk::{Leap, Noise, Place};
 use crate::chemistry::Why;
 use crate::maths::wide::Width;
-use crate::state::particles::{Block, CHUNK};
+use crate::state::particles::{Block, CHUNK, number};
 use crate::state::stream::Stream;
 
 /// What one thread needs to work on a chunk.
@@ -42,10 +42,11 @@ pub enum Trouble {
     Position {
         particle: u64,
     },
-    /// A value below the limit of its component, somewhere in this chunk.
+    /// A value below the limit of its component, somewhere in a chunk: its block, its place there.
     Negative {
         component: usize,
-        first: u64,
+        block: usize,
+        first: usize,
     },
     Chemistry {
         particle: u64,
@@ -93,7 +94,7 @@ impl<const D: usize> pulp::NullaryFnOnce for OnBlock<'_, D> {
                 break;
             }
             let n = range.len();
-            let first = block.first() + range.start as u64;
+            let first = range.start;
             let slots = &mut scratch.slots[..n];
             let mut positions = block.positions.each_mut().map(|axis| &mut axis[range.clone()]);
             if pass.work.mixes {
@@ -103,7 +104,8 @@ impl<const D: usize> pulp::NullaryFnOnce for OnBlock<'_, D> {
                 let below =
                     mix::relax(program, pass.means, pass.decays, slots, &mut chunk, target, pass.limits);
                 if let Some(component) = below {
-                    trouble.get_or_insert(Trouble::Negative { component, first });
+                    let block = block.idx as usize;
+                    trouble.get_or_insert(Trouble::Negative { component, block, first });
                 }
             }
             if let Some(reaction) = &pass.reaction {
@@ -118,7 +120,7 @@ impl<const D: usize> pulp::NullaryFnOnce for OnBlock<'_, D> {
                 let mut columns = mix::cut(&mut columns, range.clone());
                 let chunk = Chunk { n, positions, slots, columns: &mut columns, memory };
                 if let Err(failure) = reaction.react(chunk, &mut scratch.bench, &mut scratch.sums) {
-                    let particle = first + failure.particle as u64;
+                    let particle = number(&block.ids, block.idx, first + failure.particle);
                     trouble.get_or_insert(Trouble::Chemistry { particle, why: failure.why });
                 }
             }
@@ -130,7 +132,8 @@ impl<const D: usize> pulp::NullaryFnOnce for OnBlock<'_, D> {
             if pass.work.bounds {
                 for (rule, positions) in program.rules.iter().zip(&mut positions) {
                     if let Err(idx) = rule.apply(positions) {
-                        trouble.get_or_insert(Trouble::Position { particle: first + idx as u64 });
+                        let particle = number(&block.ids, block.idx, first + idx);
+                        trouble.get_or_insert(Trouble::Position { particle });
                     }
                 }
             }

@@ -81,7 +81,7 @@ pub(super) fn column(output: &Output, quantity: Quantity) -> Option<usize> {
 fn observed(plan: &Plan, snapshot: &Snapshot, column: usize, n_bins: usize) -> Result<Observed, String> {
     let single = |value: Option<f64>| value.map(|value| (vec![value], None, vec![true]));
     // A bin without masses holds none; one without fluid says nothing.
-    let least = u64::from(plan.transport.is_none());
+    let least = u64::from(!plan.carries_mass());
     let found = match &snapshot.values {
         Values::Binned { mean, standard_error, n_particles } => mean.get(column).map(|mean| {
             (

@@ -37,7 +37,8 @@ impl Plan {
         })?;
         match &patch.rule {
             SideRule::Inflow(tapes) | SideRule::Held(tapes) => {
-                require(tapes.len() == self.species.len(), || "a side carries other species".into())?;
+                let n = if self.carries_mass() { self.species.len() } else { self.components.len() };
+                require(tapes.len() == n, || "a side carries other species".into())?;
                 tapes.iter().try_for_each(|it| tape(it, "a side"))
             }
             SideRule::Partial(rate) => {
@@ -65,6 +66,8 @@ impl Plan {
     }
 
     fn check_populations(&self, transport: &Transport) -> Result<(), String> {
+        let is_right = !transport.is_of_fluid || transport.populations.is_empty();
+        require(is_right, || "fluid has no populations".into())?;
         for population in &transport.populations {
             let wrong = || "a population is not well-formed".to_owned();
             require(population.species < self.species.len() && population.count >= 1, wrong)?;

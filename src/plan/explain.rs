@@ -59,7 +59,7 @@ fn scene_lines(plan: &Plan) -> Vec<String> {
         format!(
             "{} {} particles, {:?} placement, seed {}",
             grouped(plan.particles.count),
-            if plan.transport.is_some() { "mass" } else { "fluid" },
+            if plan.carries_mass() { "mass" } else { "fluid" },
             plan.particles.placement,
             plan.seed
         )
@@ -68,7 +68,8 @@ fn scene_lines(plan: &Plan) -> Vec<String> {
     for (idx, axis) in plan.axes.iter().enumerate() {
         if plan.transport.is_some() {
             let (name, low, high) = (axis_name(axis.index), number(axis.low), number(axis.high));
-            lines.push(format!("axis {name}: {low} .. {high} m"));
+            let bins = if plan.carries_mass() { String::new() } else { format!(", {} bins", axis.bins) };
+            lines.push(format!("axis {name}: {low} .. {high} m{bins}"));
             continue;
         }
         let b = &plan.walk.spread[idx * (idx + 1) / 2..][..=idx];
@@ -130,7 +131,7 @@ fn step_lines(compiled: &Compiled) -> Vec<String> {
 
 fn field_lines(plan: &Plan) -> Vec<String> {
     let mut lines = Vec::new();
-    if plan.transport.is_some() {
+    if plan.carries_mass() {
         return vec!["a mass of one species each, beside the position".to_owned()];
     }
     let n_values = n_stored_values(plan);

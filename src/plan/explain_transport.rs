@@ -23,6 +23,9 @@ pub(super) fn lines(plan: &Plan) -> Vec<String> {
     }
     side_lines(plan, transport, &mut lines);
     lines.extend(transport.sources.iter().map(|source| source_line(plan, source)));
+    if transport.is_of_fluid {
+        lines.push("parcels come in and go out with the water".to_owned());
+    }
     for population in &transport.populations {
         let mut line =
             format!("{} particles of {}", grouped(population.count), name(plan, population.species));
@@ -54,6 +57,14 @@ fn axis_name(index: usize) -> &'static str {
 
 fn name(plan: &Plan, species: usize) -> &str {
     plan.species.get(species).map_or("", |species| species.name.as_str())
+}
+
+/// What a tape of a side is of: a species, or with fluid a component.
+fn carrier(plan: &Plan, idx: usize) -> &str {
+    match plan.carries_mass() {
+        true => name(plan, idx),
+        false => plan.components.get(idx).map_or("", |component| component.name.as_str()),
+    }
 }
 
 fn tape(tape: &Tape, unit: &str) -> String {
@@ -187,9 +198,9 @@ fn rule(plan: &Plan, rule: &SideRule) -> String {
         let parts: Vec<String> = tapes
             .iter()
             .enumerate()
-            .map(|(idx, of)| format!("{} = {}", name(plan, idx), tape(of, "")))
+            .map(|(idx, of)| format!("{} = {}", carrier(plan, idx), tape(of, "")))
             .collect();
-        parts.join(", ")
+        if parts.is_empty() { "nothing".to_owned() } else { parts.join(", ") }
     };
     match rule {
         SideRule::Reflect => "reflect".to_owned(),

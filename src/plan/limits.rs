@@ -6,7 +6,7 @@
 use super::cost::Cost;
 use super::passes::Draft;
 use super::time_scales::TimeScales;
-use super::{OutputKind, Plan, ZoneRate, auto_step, edges, reaction_limits};
+use super::{OutputKind, Plan, ZoneRate, auto_step, edges, reaction_limits, shares};
 use crate::diagnostic::codes::{N101, N102, N103, N104, N201, N202, N203, N204, N301};
 use crate::diagnostic::{Diagnostic, number, precise};
 use crate::scenario::{self, MAX_BINS, Scenario};
@@ -44,11 +44,11 @@ pub fn check(
     let plan = &draft.plan;
     let mut limits = Vec::new();
     let mut diagnostics = Vec::new();
-    // Masses walk by what `transport` says; the walk of fluid has no numbers for them.
+    // What walks by `transport` has no numbers in the walk with constant coefficients.
     if plan.transport.is_none() {
         travel(scenario, plan, &mut limits, &mut diagnostics);
         edges::check(scenario, plan, &mut diagnostics);
-    } else {
+    } else if plan.carries_mass() {
         diagnostics.extend(between_steps(scenario, draft));
     }
     if plan.mixing.is_some() {
@@ -100,8 +100,12 @@ fn spread_length(plan: &Plan, axis_idx: usize, step: f64) -> f64 {
     largest * row.iter().map(|b| (b / largest) * (b / largest)).sum::<f64>().sqrt() * step.sqrt()
 }
 
-/// Dispersion coefficient along an axis, m²/s.
+/// Dispersion coefficient along an axis, m²/s; the largest one where it varies.
 pub(super) fn dispersion(plan: &Plan, axis_idx: usize) -> f64 {
+    if let Some(transport) = &plan.transport {
+        let speed = shares::speed(&plan.axes, transport);
+        return shares::spread(&plan.axes, &transport.dispersion, speed);
+    }
     0.5 * spread_length(plan, axis_idx, 1.0).powi(2)
 }
 

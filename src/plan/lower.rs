@@ -7,7 +7,7 @@ use super::lower_decay;
 use super::lower_transport::{self, of_fluid};
 use super::{
     Axis, InstantReaction, Mixing, NUMERICS_VERSION, Normals, Output, OutputUnit, Particles, Plan, Quantity,
-    Stage, Time, Walk, Zone, ZoneRate, auto_step, method, transport_limits,
+    Stage, Time, Walk, Zone, ZoneRate, auto_step, method, shares, transport_limits,
 };
 use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{D008, M005};
@@ -29,11 +29,16 @@ pub fn lower(scenario: &Scenario) -> Result<Lowered, Vec<Diagnostic>> {
     let axes: Vec<Axis> =
         scenario.domain.axes.iter().zip(bins).map(|(axis, bins)| lower_axis(axis, bins)).collect();
     let decay = lower_decay::decay(scenario)?;
-    let Network { species, components, chemistry, warnings } = lower_chemistry::network(scenario, &axes)?;
-    let transport = lower_transport::transport(scenario, &axes, decay)?;
+    let network = lower_chemistry::network(scenario, &axes)?;
+    let transport = lower_transport::transport(scenario, &axes, &network, decay)?;
+    let Network { species, components, chemistry, warnings, .. } = network;
     let extent: f64 = axes.iter().map(|axis| axis.high - axis.low).product();
     // A particle is a volume of water.
-    let volume = extent * lower_transport::porosity_of_fluid(scenario);
+    let porosity = match &transport {
+        Some(transport) if transport.is_of_fluid => shares::mean(&transport.porosity, &axes),
+        _ => lower_transport::porosity_of_fluid(scenario),
+    };
+    let volume = extent * porosity;
     let mut plan = Plan {
         numerics: NUMERICS_VERSION,
         walk: walk(scenario),
@@ -57,8 +62,10 @@ pub fn lower(scenario: &Scenario) -> Result<Lowered, Vec<Diagnostic>> {
     if !plan.walk.drift.iter().chain(&plan.walk.spread).copied().all(f64::is_finite) {
         return Err(vec![unbounded_walk(scenario, &plan)]);
     }
-    if plan.transport.is_some() {
+    if plan.carries_mass() {
         only_masses(&mut plan);
+    } else if plan.transport.is_some() {
+        only_tracks(&mut plan);
     }
     if let Some(auto) = scenario.run.auto {
         choose_step(scenario, &mut plan, auto)?;
@@ -81,13 +88,19 @@ fn only_masses(plan: &mut Plan) {
     plan.components.clear();
     plan.species.iter_mut().for_each(|species| species.terms.clear());
     plan.chemistry = None;
-    plan.walk.drift.fill(0.0);
-    plan.walk.spread.fill(0.0);
+    only_tracks(plan);
     let reacts = plan.transport.as_ref().is_some_and(|transport| transport.decay.is_some());
     let stages = [Stage::React, Stage::Move, Stage::Observe];
     plan.stages = stages.into_iter().filter(|stage| reacts || *stage != Stage::React).collect();
     let populations = plan.transport.iter().flat_map(|transport| &transport.populations);
     plan.particles.count = populations.fold(0, |sum: u64, it| sum.saturating_add(it.count)).max(1);
+}
+
+/// What `transport` moves is not moved again, and meets its sides on the way.
+fn only_tracks(plan: &mut Plan) {
+    plan.walk.drift.fill(0.0);
+    plan.walk.spread.fill(0.0);
+    plan.stages.retain(|stage| *stage != Stage::Bound);
 }
 
 /// `step auto`: a step by the criteria, which the particles of a flow in cells divide further.

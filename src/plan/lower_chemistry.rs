@@ -24,6 +24,8 @@ pub(super) struct Network {
     pub species: Vec<Species>,
     pub components: Vec<Component>,
     pub chemistry: Option<Chemistry>,
+    /// What one unit of each species adds to the components.
+    pub totals: Vec<Vec<(usize, f64)>>,
     pub warnings: Vec<Diagnostic>,
 }
 
@@ -62,7 +64,8 @@ pub(super) fn network(scenario: &Scenario, axes: &[Axis]) -> Result<Network, Vec
         is_molar: species.dimension == Dimension::MOLAR_CONCENTRATION,
     };
     let species = scenario.species.iter().enumerate().map(species).collect();
-    Ok(Network { species, components, chemistry, warnings: problems })
+    let totals = (0..scenario.species.len()).map(|species| carried.totals(species)).collect();
+    Ok(Network { species, components, chemistry, totals, warnings: problems })
 }
 
 /// Which species have a component, and which totals the others add to.

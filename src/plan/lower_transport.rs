@@ -1,4 +1,4 @@
-//! Transport of masses, from the scenario to what the engine walks in.
+//! Transport along tracks, from the scenario to what the engine walks in.
 //!
 //! Owns the lowering of flow, dispersion, sides, sources and populations. May use the scenario and the tape.
 //! It deliberately solves no flow; what can be seen without one is checked in `transport_limits`.
@@ -6,6 +6,7 @@
 use super::Axis;
 use super::build_tape::build_tape;
 use super::lower::too_large;
+use super::lower_chemistry::Network;
 use super::shares;
 use super::tape::{Binary, Operation, Tape};
 use super::transport::{
@@ -14,26 +15,49 @@ use super::transport::{
 };
 use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::R104;
-use crate::scenario::expression::Expr;
+use crate::scenario::expression::{Expr, Type};
 use crate::scenario::transport as written;
 use crate::scenario::{self, Scenario};
 use crate::source::Span;
+use crate::units::Dimension;
 
-/// The transport of a scene with masses; `None` where today's walk of fluid says everything.
+/// The transport of a scene; `None` where the walk of fluid with constant coefficients says everything.
 pub(super) fn transport(
     scenario: &Scenario,
     axes: &[Axis],
+    network: &Network,
     decay: Option<Decay>,
 ) -> Result<Option<Transport>, Vec<Diagnostic>> {
-    if scenario.particles.shares.is_none() {
+    let is_of_fluid = scenario.particles.shares.is_none();
+    if is_of_fluid && is_plain(scenario) {
         return Ok(None);
     }
-    let mut lowering = Lowering { scenario, axes, problems: Vec::new() };
+    let totals = is_of_fluid.then_some((&network.totals[..], network.components.len()));
+    let mut lowering = Lowering { scenario, axes, totals, problems: Vec::new() };
     let transport = lowering.transport(decay);
     match transport {
         Some(transport) if lowering.problems.is_empty() => Ok(Some(transport)),
         _ => Err(lowering.problems),
     }
+}
+
+/// Whether flow, dispersion and porosity are the same everywhere, and sides simple.
+fn is_plain(scenario: &Scenario) -> bool {
+    let flow = scenario.flow.as_ref().map(|flow| &flow.value);
+    let is_bare = |patch: &written::Patch| {
+        let rule = &patch.rule;
+        let is_simple = *rule == written::SideRule::Reflect
+            || *rule == written::SideRule::Periodic
+            || *rule == written::SideRule::Open;
+        patch.limits.is_empty() && is_simple
+    };
+    matches!(flow, None | Some(written::Flow::Uniform(_)))
+        && !matches!(
+            scenario.dispersion.as_ref().map(|dispersion| &dispersion.value),
+            Some(written::Dispersion::Isotropic(_))
+        )
+        && scenario.medium.as_ref().is_none_or(|porosity| porosity.value.value().is_some())
+        && scenario.domain.axes.iter().flat_map(|axis| axis.patches.iter().flatten()).all(is_bare)
 }
 
 /// `value` everywhere.
@@ -73,9 +97,14 @@ pub(super) fn uniform_tensor(velocity: [f64; 3], [along, across, vertical, own]:
     tensor
 }
 
+/// What one unit of each species adds to the components, and how many of these there are.
+type Totals<'a> = (&'a [Vec<(usize, f64)>], usize);
+
 struct Lowering<'a> {
     scenario: &'a Scenario,
     axes: &'a [Axis],
+    /// With fluid.
+    totals: Option<Totals<'a>>,
     problems: Vec<Diagnostic>,
 }
 
@@ -89,7 +118,8 @@ impl Lowering<'_> {
         };
         let sides = self.sides()?;
         let sources = self.scenario.sources.iter().map(|source| self.source(source)).collect();
-        let populations = self.populations(own)?;
+        let is_of_fluid = self.totals.is_some();
+        let populations = if is_of_fluid { Vec::new() } else { self.populations(own)? };
         let interfaces = self.interfaces(&dispersion, &porosity);
         let mut transport = Transport {
             flow,
@@ -98,10 +128,14 @@ impl Lowering<'_> {
             sides,
             sources,
             populations,
+            is_of_fluid,
             decay,
             sub_steps: None,
             interfaces,
         };
+        if is_of_fluid {
+            return Some(transport);
+        }
         let counts = shares::counts(self.scenario, self.axes, &transport);
         transport.populations.iter_mut().zip(counts).for_each(|(population, count)| population.count = count);
         Some(transport)
@@ -253,13 +287,45 @@ impl Lowering<'_> {
         Some(patches)
     }
 
-    /// One tape for each species of the scene; what is not named is not there.
+    /// One tape for each species of the scene, or for each component that fluid carries; what is not named is not
+    /// there.
     fn concentrations(&mut self, list: &[(usize, Expr)]) -> Option<Vec<Tape>> {
+        if let Some((totals, n_components)) = self.totals {
+            return (0..n_components).map(|component| self.total(list, totals, component)).collect();
+        }
         let mut tapes = vec![constant(0.0); self.scenario.species.len()];
         for (species, expr) in list {
             tapes[*species] = self.tape(expr, expr.span)?;
         }
         Some(tapes)
+    }
+
+    /// What concentrations of species are of a component.
+    fn total(
+        &mut self,
+        list: &[(usize, Expr)],
+        totals: &[Vec<(usize, f64)>],
+        component: usize,
+    ) -> Option<Tape> {
+        let mut sum: Option<Expr> = None;
+        for (species, expr) in list {
+            let share = totals[*species].iter().find(|(other, _)| *other == component);
+            let Some(&(_, nu)) = share else { continue };
+            let (kind, span) = (expr.kind, expr.span);
+            let factor = Expr::constant(nu, Type::Number(Dimension::NONE), span);
+            let own = match nu {
+                1.0 => expr.clone(),
+                _ => Expr::binary(Binary::Multiply, factor, expr.clone(), kind, span),
+            };
+            sum = Some(match sum {
+                None => own,
+                Some(before) => Expr::binary(Binary::Add, before, own, kind, span),
+            });
+        }
+        match sum {
+            None => Some(constant(0.0)),
+            Some(expr) => self.tape(&expr, expr.span),
+        }
     }
 
     fn source(&self, source: &written::Source) -> Source {

@@ -11,6 +11,7 @@ use super::chemistry::{Integrator, Kinetic, Kinetics, Law, Method};
 pub(super) fn choose(plan: &mut Plan) {
     let species_of = species_of_components(plan);
     let immobile: Vec<bool> = plan.components.iter().map(|component| component.is_immobile).collect();
+    let changes_water = plan.transport.as_ref().is_some_and(super::transport::Transport::changes_water);
     let Some(chemistry) = &mut plan.chemistry else { return };
     let is_closed = chemistry.equilibrium.is_none();
     let integrator = chemistry.integrator;
@@ -22,7 +23,11 @@ pub(super) fn choose(plan: &mut Plan) {
         (Integrator::Explicit, _) => Method::Explicit,
         (Integrator::Rosenbrock, _) => Method::Rosenbrock,
         (Integrator::Auto, Some(species_of)) if is_closed => {
-            let method = closed_form(kinetics, &species_of, &immobile);
+            let method = match closed_form(kinetics, &species_of, &immobile) {
+                // Water that comes in later has reacted for a shorter time.
+                Method::Observed if changes_water => Method::Exponential,
+                method => method,
+            };
             if method == Method::Observed {
                 // What particles carry stays unreacted: the changes are those of species.
                 let changes = kinetics.reactions.iter_mut().flat_map(|reaction| &mut reaction.changes);

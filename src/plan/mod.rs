@@ -198,6 +198,16 @@ pub struct Time {
 }
 
 impl Plan {
+    /// Whether particles carry mass of one species each; otherwise they are parcels of water.
+    pub fn carries_mass(&self) -> bool {
+        self.transport.as_ref().is_some_and(|transport| !transport.is_of_fluid)
+    }
+
+    /// Whether particles change their places.
+    pub fn moves(&self) -> bool {
+        self.transport.is_some() || self.walk.drift.iter().chain(&self.walk.spread).any(|entry| *entry != 0.0)
+    }
+
     /// Sets the number of particles; each then stands for as much more or less.
     pub fn set_count(&mut self, count: u64) {
         let before = self.particles.count;

@@ -193,9 +193,8 @@ fn noise_of_means(
     diagnostics: &mut Vec<Diagnostic>,
 ) {
     let n_bins: f64 = plan.axes.iter().map(|axis| axis.bins as f64).product();
-    let is_moving = plan.walk.drift.iter().chain(&plan.walk.spread).any(|entry| *entry != 0.0);
     let is_well_mixed = plan.mixing.as_ref().is_some_and(|mixing| mixing.is_well_mixed);
-    if !is_well_mixed || !is_moving || n_bins <= 1.0 {
+    if !is_well_mixed || !plan.moves() || n_bins <= 1.0 {
         return;
     }
     let kinetics = plan.chemistry.as_ref().and_then(|chemistry| chemistry.kinetics.as_ref());
@@ -232,8 +231,7 @@ fn noise_of_means(
 fn particles_per_bin(scenario: &Scenario, plan: &Plan, diagnostics: &mut Vec<Diagnostic>) {
     let n_bins: f64 = plan.axes.iter().map(|axis| axis.bins as f64).product();
     let per_bin = plan.particles.count as f64 / n_bins;
-    let is_moving = plan.walk.drift.iter().chain(&plan.walk.spread).any(|entry| *entry != 0.0);
-    if per_bin >= FEW_PER_BIN || !is_moving && per_bin >= 1.0 {
+    if per_bin >= FEW_PER_BIN || !plan.moves() && per_bin >= 1.0 {
         return;
     }
     let span = scenario.bins.as_ref().map_or(scenario.domain.span, |bins| bins.span);

@@ -5,7 +5,7 @@
 //! transport hangs on an estimate.
 
 use super::Axis;
-use super::tape::Tape;
+use super::tape::{Operation, Tape};
 use super::transport::{
     Conductivity, Darcy, DarcySide, Dispersion, Flow, Patch, Population, Region, SideRule, Strength,
     Transport,
@@ -40,7 +40,11 @@ pub(super) fn places(axes: &[Axis], n_operations: usize) -> Vec<[f64; 4]> {
     list
 }
 
-fn mean(tape: &Tape, axes: &[Axis]) -> f64 {
+/// Mean over the domain; a constant is itself.
+pub(super) fn mean(tape: &Tape, axes: &[Axis]) -> f64 {
+    if let [Operation::Constant(value)] = tape.operations[..] {
+        return value;
+    }
     let places = places(axes, tape.operations.len());
     let sum: f64 = places.iter().map(|place| tape.evaluate(place)).filter(|value| value.is_finite()).sum();
     sum / places.len() as f64

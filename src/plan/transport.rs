@@ -26,6 +26,9 @@ pub struct Transport {
     pub sources: Vec<Source>,
     /// Masses of one species each; none if the particles are fluid.
     pub populations: Vec<Population>,
+    /// True: particles are parcels of water, and what sides carry is a tape for each component.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub is_of_fluid: bool,
     /// First-order reactions of what carries mass; none if nothing reacts.
     pub decay: Option<Decay>,
     /// Steps of each particle's own within a step.
@@ -34,7 +37,39 @@ pub struct Transport {
     pub interfaces: Vec<Interface>,
 }
 
+#[allow(clippy::trivially_copy_pass_by_ref)] // serde asks for a reference.
+fn is_false(value: &bool) -> bool {
+    !*value
+}
+
 impl Transport {
+    /// Whether anything is put into the water, or taken out of it, after the start: what it then is depends on
+    /// when that was.
+    pub fn changes_water(&self) -> bool {
+        let is_bare = |rule: &SideRule| {
+            matches!(rule, SideRule::Reflect | SideRule::Periodic | SideRule::Open | SideRule::Outflow)
+        };
+        let mut patches = self.sides.iter().flatten().flatten();
+        self.injects() || patches.any(|patch| !is_bare(&patch.rule))
+    }
+
+    /// What sides bring of all species or components.
+    pub fn carried_mut(&mut self) -> impl Iterator<Item = &mut Tape> {
+        self.sides.iter_mut().flatten().flatten().flat_map(|patch| match &mut patch.rule {
+            SideRule::Inflow(tapes) | SideRule::Held(tapes) => tapes.iter_mut(),
+            _ => [].iter_mut(),
+        })
+    }
+
+    /// Whether wells may put water in.
+    pub fn injects(&self) -> bool {
+        match &self.flow {
+            Flow::Darcy(flow) => flow.wells.iter().any(|well| well.rate > 0.0),
+            Flow::Uniform(_) | Flow::Expression(_) => false,
+            Flow::File(_) => true,
+        }
+    }
+
     /// What takes water out within the domain, and what is in it.
     pub fn outlets(&self) -> Vec<Outlet> {
         match &self.flow {
@@ -159,9 +194,9 @@ pub enum SideRule {
     Partial(f64),
     /// Leaves with the water: no gradient.
     Outflow,
-    /// Water that enters carries these concentrations, one tape per species.
+    /// Water that enters carries these concentrations: one tape per species, or with fluid per component.
     Inflow(Vec<Tape>),
-    /// These concentrations are held at the side, one tape per species.
+    /// These concentrations are held at the side: one tape per species, or with fluid per component.
     Held(Vec<Tape>),
 }
 

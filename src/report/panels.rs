@@ -136,7 +136,7 @@ impl<'a> Story<'a> {
         let mut marks = Vec::new();
         for snapshot in self.of_output(output_idx) {
             let Some(color) = self.color_at(snapshot.t) else { continue };
-            let points = bin_values(&snapshot.values, self.plan.transport.is_some(), q, centres);
+            let points = bin_values(&snapshot.values, self.plan.carries_mass(), q, centres);
             let every = points.len().div_ceil(MOST_DOTS).max(1);
             marks.push(Mark { points: points.into_iter().step_by(every).collect(), color, look: Look::Dots });
         }
@@ -331,7 +331,7 @@ impl<'a> Story<'a> {
         let mean = mean.get(q)?;
         let n_particles = counts(n_particles, mean.len(), q);
         // A bin without masses holds none, and counts like all others.
-        let has_masses = self.plan.transport.is_some();
+        let has_masses = self.plan.carries_mass();
         let largest = mean.iter().filter(|v| v.is_finite()).fold(0.0, |most: f64, v| most.max(v.abs()));
         let shown = display::value(self.plan, output, output.quantities[q], self.n_axes, largest);
         let (stride_a, stride_b) = (grid.stride(a)?, grid.stride(b)?);

@@ -5,8 +5,9 @@
 
 use crate::plan::Plan;
 use crate::plan::compile::before_passes;
-use crate::plan::tape::{Binary, Operation, Register};
-use crate::plan::{Component, Time, ZoneRate, chemistry};
+use crate::plan::tape::{Binary, Operation, Register, Tape};
+use crate::plan::transport::Transport;
+use crate::plan::{Time, ZoneRate, chemistry};
 use crate::scenario::Scenario;
 
 /// A quantity of a scene that is multiplied.
@@ -84,7 +85,9 @@ impl Knob {
         match self {
             Self::Rates => multiply_rates(plan, factor),
             Self::Concentrations => {
-                plan.components.iter_mut().for_each(|component| multiply_initial(component, factor));
+                plan.components.iter_mut().for_each(|component| multiply(&mut component.initial, factor));
+                let transport = plan.transport.iter_mut();
+                transport.flat_map(Transport::carried_mut).for_each(|tape| multiply(tape, factor));
                 if let Some(chemistry) = &mut plan.chemistry {
                     chemistry.floors.iter_mut().for_each(|floor| *floor *= factor);
                 }
@@ -125,8 +128,8 @@ fn exchanges(plan: &Plan) -> bool {
     zones.any(|zone| matches!(zone.rate, ZoneRate::Finite(rate) if rate > 0.0))
 }
 
-fn multiply_initial(component: &mut Component, factor: f64) {
-    let operations = &mut component.initial.operations;
+fn multiply(tape: &mut Tape, factor: f64) {
+    let operations = &mut tape.operations;
     let result = (operations.len() - 1) as Register;
     operations.push(Operation::Constant(factor));
     operations.push(Operation::Binary(Binary::Multiply, result, result + 1));

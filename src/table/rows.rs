@@ -154,7 +154,7 @@ impl Block<'_> {
                 columns.extend(self.bin_coordinates(rows.clone()));
                 columns.extend(self.names(rows.len()));
                 let n_particles = counts(n_particles, mean[q].len(), q);
-                let is_known = |row: usize| n_particles[row] > 0 || self.plan.transport.is_some();
+                let is_known = |row: usize| n_particles[row] > 0 || self.plan.carries_mass();
                 columns.push(self.values(&mean[q], rows.clone(), is_known));
                 columns.push(self.values(&standard_error[q], rows.clone(), |row| n_particles[row] > 1));
                 columns.push(numbers(&n_particles[rows.clone()]));

@@ -80,7 +80,7 @@ impl<const D: usize> Site<'_, D> {
 
     /// Rectangles of a patch that no earlier one holds, small enough to be looked at in the middle: what enters
     /// is a tape, with the cuts that it is worth.
-    fn faces(
+    pub fn faces(
         &self,
         [axis, end]: [usize; 2],
         idx: usize,

@@ -1,6 +1,6 @@
 //! From flow and dispersion of a plan to the medium of a walk.
 //!
-//! Owns the choice of the medium. May use the plan and `track`. It deliberately runs nothing itself.
+//! Owns the choice of the medium. May use the plan and `track`. It deliberately knows no particle.
 
 use super::super::control::{Control, Settings};
 use super::super::error::RunError;
@@ -8,38 +8,70 @@ use super::super::program::unsound;
 use super::super::snapshot::Outcome;
 use super::super::track::cells::{CellMedium, Dispersivity};
 use super::super::track::formula::{Formula, Spreading};
+use super::super::track::medium::Medium;
 use super::super::track::uniform::Uniform;
 use super::run::{Sink, go};
 use super::world::Site;
-use crate::flow::build;
+use crate::flow::{FaceFlow, build};
 use crate::plan::Plan;
 use crate::plan::tape::{Operation, Tape};
 use crate::plan::transport::{Dispersion, Flow};
 use std::sync::Arc;
 
-/// Runs a plan of masses; the medium is matched here, once.
+/// What is done in a medium, whichever it is.
+pub trait InMedium<const D: usize> {
+    type Output;
+
+    fn go<M: Medium<D> + Send + 'static>(self, site: &Site<D>, medium: M) -> Result<Self::Output, RunError>;
+}
+
+/// A run of masses.
+struct Masses<'a> {
+    settings: &'a Settings,
+    control: &'a dyn Control,
+    sink: Sink<'a>,
+}
+
+impl<const D: usize> InMedium<D> for Masses<'_> {
+    type Output = Outcome;
+
+    fn go<M: Medium<D> + Send + 'static>(self, site: &Site<D>, medium: M) -> Result<Outcome, RunError> {
+        go(site, medium, self.settings, self.control, self.sink)
+    }
+}
+
+/// Runs a plan of masses.
 pub fn run<const D: usize>(
     plan: &Plan,
     settings: &Settings,
     control: &dyn Control,
     sink: Sink,
 ) -> Result<Outcome, RunError> {
-    let flow = match &settings.flow {
-        Some(flow) => Some(flow.clone()),
-        None => build::of(plan)
-            .map_err(|error| RunError::Flow(error.to_string()))?
-            .map(|solution| Arc::new(solution.flow)),
-    };
-    let site = Site::<D>::new(plan, flow)?;
+    let site = Site::<D>::new(plan, flow_of(plan, settings)?)?;
+    in_medium(&site, Masses { settings, control, sink })
+}
+
+/// The flow of a plan, if it has to be solved or read.
+pub fn flow_of(plan: &Plan, settings: &Settings) -> Result<Option<Arc<FaceFlow>>, RunError> {
+    if let Some(flow) = &settings.flow {
+        return Ok(Some(flow.clone()));
+    }
+    let solution = build::of(plan).map_err(|error| RunError::Flow(error.to_string()))?;
+    Ok(solution.map(|solution| Arc::new(solution.flow)))
+}
+
+/// Does something in the medium of a plan, which is matched here, once.
+pub fn in_medium<const D: usize, W: InMedium<D>>(site: &Site<D>, what: W) -> Result<W::Output, RunError> {
+    let plan = site.plan;
     match (&site.transport.flow, &site.transport.dispersion) {
         (Flow::Uniform(velocity), Dispersion::Constant(_) | Dispersion::Velocity { .. })
             if is_constant(&site.transport.porosity) =>
         {
             let velocity: [f64; D] =
                 velocity.clone().try_into().map_err(|_| unsound("a velocity that does not fit the axes"))?;
-            go(&site, uniform(plan, velocity, &site.transport.dispersion)?, settings, control, sink)
+            what.go(site, uniform(plan, velocity, &site.transport.dispersion)?)
         }
-        (Flow::Uniform(_) | Flow::Expression(_), _) => go(&site, formula(&site)?, settings, control, sink),
+        (Flow::Uniform(_) | Flow::Expression(_), _) => what.go(site, formula(site)?),
         (
             Flow::Darcy(_) | Flow::File(_),
             Dispersion::Velocity { longitudinal, transverse, molecular, .. },
@@ -50,7 +82,7 @@ pub fn run<const D: usize>(
                 Dispersivity { longitudinal: *longitudinal, transverse: *transverse, molecular: *molecular };
             let medium = CellMedium::<D>::new(flow, axes, dispersivity)
                 .ok_or_else(|| unsound("cells that are not equal, or porosity that varies"))?;
-            go(&site, medium, settings, control, sink)
+            what.go(site, medium)
         }
         _ => Err(unsound("flow and dispersion that do not go together yet")),
     }

@@ -91,6 +91,21 @@ impl<const D: usize> Cells<D> {
         self.cumulative.last().copied().unwrap_or(0.0)
     }
 
+    /// The place that a share of the mass comes before.
+    pub fn at(&self, share: f64, uniforms: &[f64; 8]) -> [f64; D] {
+        let (cell, part) = find(&self.cumulative, share * self.total());
+        // Along one axis the share itself is the best draw; it is one of several otherwise.
+        let fraction = std::array::from_fn(|axis| if D == 1 { part } else { uniforms[axis] });
+        self.inside(cell, fraction)
+    }
+
+    /// The middle of each cell, with its mass.
+    pub fn masses(&self) -> impl Iterator<Item = ([f64; D], f64)> + '_ {
+        let before = [0.0].into_iter().chain(self.cumulative.iter().copied());
+        let own = self.cumulative.iter().zip(before).map(|(sum, before)| sum - before);
+        own.enumerate().map(|(cell, mass)| (self.inside(cell, [0.5; D]), mass))
+    }
+
     fn inside(&self, cell: usize, fraction: [f64; D]) -> [f64; D] {
         let mut rest = cell;
         let mut place = [0.0; D];
@@ -157,12 +172,7 @@ impl<const D: usize> Place<D> {
                 let normals = normals(uniforms);
                 std::array::from_fn(|axis| tails[axis].folded(centre[axis] + deviation[axis] * normals[axis]))
             }
-            Self::Cells(cells) => {
-                let (cell, part) = find(&cells.cumulative, share * cells.total());
-                // Along one axis the share itself is the best draw; it is one of several otherwise.
-                let fraction = std::array::from_fn(|axis| if D == 1 { part } else { uniforms[axis] });
-                cells.inside(cell, fraction)
-            }
+            Self::Cells(cells) => cells.at(share, uniforms),
             Self::Faces(faces) => {
                 let (face, _) = find(&faces.cumulative, uniforms[3] * faces.total());
                 let (low, high) = &faces.corners[face];

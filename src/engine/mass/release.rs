@@ -138,7 +138,7 @@ impl<const D: usize> Release<D> {
 
 impl Sampling {
     /// Share of the mass that comes before a particle.
-    fn share(self, count: u64, n: u64, uniforms: &[f64; 8]) -> f64 {
+    pub fn share(self, count: u64, n: u64, uniforms: &[f64; 8]) -> f64 {
         match self {
             Self::Random => uniforms[7],
             Self::Stratified => (count as f64 + uniforms[7]) / n as f64,

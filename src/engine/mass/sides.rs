@@ -23,7 +23,7 @@ impl<const D: usize> Site<'_, D> {
             let patch = |patch: &crate::plan::transport::Patch| walls::Patch {
                 low: std::array::from_fn(|other| patch.low[other]),
                 high: std::array::from_fn(|other| patch.high[other]),
-                law: law(&patch.rule),
+                law: if self.transport.is_of_fluid { wet(&patch.rule) } else { law(&patch.rule) },
             };
             Some(Wall { at, patches: sides[end].iter().map(patch).collect() })
         };
@@ -37,5 +37,14 @@ fn law(rule: &SideRule) -> Law {
         SideRule::Absorb | SideRule::Held(_) => Law::Absorb,
         SideRule::Partial(rate) => Law::Partial(*rate),
         SideRule::Outflow => Law::Outflow,
+    }
+}
+
+/// What a side does to parcels of water: they leave with it where it leaves, and else stay.
+fn wet(rule: &SideRule) -> Law {
+    match rule {
+        SideRule::Reflect | SideRule::Periodic | SideRule::Open => Law::Reflect,
+        SideRule::Inflow(_) | SideRule::Outflow => Law::Outflow,
+        SideRule::Absorb | SideRule::Held(_) | SideRule::Partial(_) => Law::Wet,
     }
 }

@@ -24,7 +24,7 @@ impl<const D: usize> Site<'_, D> {
     }
 
     /// Lower and upper corner of a cell of the flow.
-    fn cell(&self, flow: &FaceFlow, cell: usize) -> [[f64; D]; 2] {
+    pub fn cell(&self, flow: &FaceFlow, cell: usize) -> [[f64; D]; 2] {
         let place = flow.cells.place(cell);
         let edge = |axis: usize, end: usize| {
             let index = self.plan.axes[axis].index;

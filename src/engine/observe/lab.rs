@@ -136,8 +136,8 @@ pub struct Lab<const D: usize> {
     pub species: Vec<[f64; CHUNK]>,
     /// Per species and component the slope of the reacted concentration by U.
     pub slopes: Vec<[f64; CHUNK]>,
-    /// Number of the first particle.
-    pub first: u64,
+    /// Numbers of the particles.
+    pub numbers: Vec<u64>,
     /// Per species, where some are in equilibrium.
     speciated: Vec<[f64; CHUNK]>,
     solver: crate::chemistry::Scratch,
@@ -160,7 +160,7 @@ impl<const D: usize> Lab<D> {
             unreacted: zeros(n_species),
             species: zeros(n_species),
             slopes: zeros(n_species * program.n_components()),
-            first: 0,
+            numbers: Vec::new(),
             speciated: zeros(if program.has_equilibrium() { n_species } else { 0 }),
             solver: crate::chemistry::Scratch::default(),
             scratch: Scratch::new(),
@@ -191,7 +191,10 @@ pub fn load<const D: usize>(
     let program = &run.program;
     let n = range.len();
     lab.n = n;
-    lab.first = block.first() + range.start as u64;
+    if run.reactions.speciation.is_some() {
+        lab.numbers.clear();
+        lab.numbers.extend(range.clone().map(|idx| block.number(idx)));
+    }
     for axis in 0..D {
         lab.positions[axis][..n].copy_from_slice(&block.positions[axis][range.clone()]);
     }
@@ -283,7 +286,7 @@ fn equilibrate<const D: usize>(run: &Run<D>, lab: &mut Lab<D>) {
     let components: Vec<&[f64]> = lab.components.iter().map(|column| &column[..n]).collect();
     let mut species: Vec<&mut [f64]> = lab.speciated.iter_mut().map(|column| &mut column[..n]).collect();
     if let Err(failure) = speciation.reactor.speciate(&components, &mut species, &mut lab.solver) {
-        speciation.fail(lab.first + failure.particle as u64, failure.why);
+        speciation.fail(lab.numbers[failure.particle], failure.why);
     }
     for &idx in &speciation.species {
         lab.species[idx][..n].copy_from_slice(&lab.speciated[idx][..n]);

@@ -65,7 +65,7 @@ impl<'a, const D: usize> Mixing<'a, D> {
         let weight = |&n: &f64| if n > 1.0 { [n / (n - 1.0), 1.0 / (n - 1.0)] } else { [0.0; 2] };
         let mut weights: Vec<[f64; 2]> = means.counts[..n_bins].iter().map(weight).collect();
         weights.push([0.0; 2]);
-        let volume = program.plan.particles.volume;
+        let volume = program.volume;
         Self { grid, means, weights, products, recipes, volume, carried_fraction: program.carried_fraction }
     }
 

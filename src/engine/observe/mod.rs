@@ -20,6 +20,7 @@ use super::schedule::Due;
 use super::snapshot::{Snapshot, Values};
 use crate::plan::{Output, OutputKind, Plan, Quantity};
 use crate::state::grid::Grid;
+use crate::state::particles::Block;
 use chemistry::Needs;
 pub use lab::{Draws, Instant, Lab};
 use look::{Look, Sums};
@@ -215,7 +216,7 @@ fn sweep<const D: usize>(
     merged
 }
 
-/// Every particle, in order.
+/// Every particle, in the order of numbers.
 fn particles<const D: usize>(run: &Run<D>, instant: &Instant<D>, means: &Means, needs: &Needs) -> Values {
     let n_species = run.program.plan.species.len();
     let of_block = |block_idx: usize| {
@@ -239,9 +240,21 @@ fn particles<const D: usize>(run: &Run<D>, instant: &Instant<D>, means: &Means, 
         columns
     };
     let per_block: Vec<Vec<Vec<f64>>> = parallel::map(run.blocks.len(), &of_block);
-    let column = |idx: usize| per_block.iter().flat_map(|columns| columns[idx].iter().copied()).collect();
+    let order = order(&run.blocks);
+    let column = |idx: usize| {
+        let values: Vec<f64> = per_block.iter().flat_map(|columns| columns[idx].iter().copied()).collect();
+        if order.is_empty() { values } else { order.iter().map(|&place| values[place]).collect() }
+    };
     Values::Particles {
         positions: (0..D).map(column).collect(),
         concentrations: (D..D + n_species).map(column).collect(),
     }
+}
+
+/// Places of all particles in the order of their numbers; nothing where they lie in that order.
+fn order<const D: usize>(blocks: &[Block<D>]) -> Vec<usize> {
+    let ids: Vec<u64> = blocks.iter().flat_map(|block| block.ids.iter().copied()).collect();
+    let mut order: Vec<usize> = (0..ids.len()).collect();
+    order.sort_unstable_by_key(|&place| ids[place]);
+    order
 }

@@ -47,7 +47,7 @@ pub fn add_second<const D: usize>(lab: &Lab<D>, species: &[usize], first: &[f64]
 
 /// Amount, centre and second central moments per species.
 pub fn moments<const D: usize>(program: &Program<D>, n: usize, first: &[f64], second: &[f64]) -> Values {
-    let volume = program.plan.particles.volume;
+    let volume = program.volume;
     let index = |axis: usize| program.plan.axes[axis].index;
     let row = |species: usize| {
         let first = &first[species * (1 + D)..][..1 + D];

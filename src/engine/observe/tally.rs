@@ -210,7 +210,7 @@ impl<'a, const D: usize> Tally<'a, D> {
                 Some(covariances(bins.grid.n_bins(), pairs.len(), first, second))
             }
             Self::Total { in_bins, .. } => {
-                let volume = program.plan.particles.volume;
+                let volume = program.volume;
                 let sums = first.iter().zip(in_bins).map(|(sum, in_bins)| in_bins.unwrap_or(*sum));
                 Some(Values::Total { amount: sums.map(|sum| volume * sum).collect() })
             }
@@ -243,7 +243,11 @@ fn amount_in_bins<const D: usize>(
     }
     let n_particles = program.plan.particles.count as f64;
     let n_bins = program.grid.n_bins();
-    let of_term = |&(k, coefficient): &(usize, f64)| coefficient * lane_sum(&immobile[k - first][..n_bins]);
+    let of_bins = |bins: &[f64]| match &program.uneven {
+        None => lane_sum(bins),
+        Some(_) => program.sum_of_bins(bins),
+    };
+    let of_term = |&(k, coefficient): &(usize, f64)| coefficient * of_bins(&immobile[k - first][..n_bins]);
     let sum: f64 = recipe.terms.iter().map(of_term).sum();
     Some(n_particles * (recipe.constant + sum / n_bins as f64))
 }

@@ -10,7 +10,7 @@ use super::medium::{Carrier, Criteria, Leap, Medium};
 use super::monitors::{Crossing, Plane};
 use super::noise::{Draws, Normals};
 use super::turning::Fates;
-use super::walls::{Ends, Exit, Stride};
+use super::walls::{Ends, Exit, Met, Stride, Touch};
 use crate::maths::wide::Width;
 
 /// Part of a step before which nothing happens in it: what does is told apart from the step before, whose end
@@ -52,6 +52,10 @@ pub trait Events {
     fn left(&mut self, id: u64, exit: Exit, t: f64);
     /// A particle has crossed a plane at time `t`.
     fn crossed(&mut self, id: u64, plane: usize, crossing: Crossing, t: f64);
+    /// A parcel of water has touched a wall; it may leave after that.
+    fn touched(&mut self, touch: &Touch) {
+        let _ = touch;
+    }
 }
 
 /// What one thread needs for a group.
@@ -60,7 +64,7 @@ pub struct Bench<const D: usize, M: Medium<D>> {
     pub(super) normals: Box<Normals>,
     pub(super) look: M::Look,
     pub(super) leap: Leap,
-    exits: Vec<Exit>,
+    met: Met,
     /// What becomes of the group, if it turns.
     pub fates: Option<Box<Fates>>,
     /// Displacements done, one per particle.
@@ -81,7 +85,7 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
             normals: Normals::new(),
             look: self.medium.blank(),
             leap: Leap::new(1.0),
-            exits: Vec::new(),
+            met: Met::default(),
             fates: None,
             displacements: 0,
         }
@@ -185,7 +189,7 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
         bench: &mut Bench<D, M>,
         events: &mut impl Events,
     ) {
-        let Bench { lanes, normals, look, leap, exits, .. } = bench;
+        let Bench { lanes, normals, look, leap, met, .. } = bench;
         let before = lanes.positions;
         let row = self.draws.prepare(self.width, &lanes.ids, number, normals);
         let rows: [&Lane; D] = std::array::from_fn(|axis| normals.row(row + axis));
@@ -205,7 +209,10 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
         }
         let free = (!self.planes.is_empty()).then_some(lanes.positions);
         for (axis, ends) in self.ends.iter().enumerate() {
-            ends.apply(axis, &stride, lanes, exits);
+            ends.apply(axis, &stride, lanes, met);
+        }
+        for touch in met.touches.drain(..) {
+            events.touched(&touch);
         }
         for (idx, plane) in self.planes.iter().enumerate() {
             let Some(free) = &free else { continue };
@@ -215,9 +222,9 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
             });
         }
         for (idx, drain) in self.drains.iter().enumerate() {
-            drain.apply(idx, &stride, lanes, exits);
+            drain.apply(idx, &stride, lanes, &mut met.exits);
         }
-        for exit in exits.drain(..) {
+        for exit in met.exits.drain(..) {
             let t = start[exit.lane] + exit.fraction * leap.time[exit.lane];
             events.left(lanes.ids[exit.lane], exit, t.max(earliest));
         }

@@ -22,10 +22,12 @@ pub enum Law {
     Partial(f64),
     /// What comes with the water leaves with it, and there is no gradient.
     Outflow,
+    /// The same for a parcel of water, and what it carries is told about the touch.
+    Wet,
 }
 
-/// A part of a wall: the first that holds a place decides.
-#[derive(Debug, Clone, PartialEq)]
+/// A part of a wall: the first that holds a place decides, and the last one has no limits.
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Patch<const D: usize> {
     pub low: [f64; D],
     pub high: [f64; D],
@@ -56,6 +58,26 @@ pub struct Exit {
     pub patch: usize,
     /// Part of the displacement that was done.
     pub fraction: f64,
+}
+
+/// A parcel of water that has touched a wall.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Touch {
+    pub lane: usize,
+    /// Twice the axis, plus one at its upper end.
+    pub side: usize,
+    pub patch: usize,
+    /// Push of the wall over the dispersion normal to it, `L/D`, s/m.
+    pub push: f64,
+    /// Along the active axes, m.
+    pub place: [f64; 3],
+}
+
+/// What particles did at walls in a displacement.
+#[derive(Debug, Clone, Default)]
+pub struct Met {
+    pub exits: Vec<Exit>,
+    pub touches: Vec<Touch>,
 }
 
 /// One displacement of a group, before and after.
@@ -105,9 +127,17 @@ impl Way {
 }
 
 /// Where a particle is after it met a wall.
+#[derive(Debug, Clone, Copy, PartialEq)]
 enum Fate {
     At(f64),
     Gone,
+}
+
+/// The end of a way.
+struct End {
+    fate: Fate,
+    /// `L/D`, s/m.
+    push: f64,
 }
 
 impl Law {
@@ -119,20 +149,22 @@ impl Law {
     /// - Source: methods, section 1.6; A. V. Skorokhod (1961), doi:10.1137/1106035; `E dL = D c(0) dt`, so that
     ///   killing at rate `k/D` per push is the flux `k c`.
     /// - Shape: one particle.
-    fn end(self, way: Way, k: f64, dt: f64, uniforms: [f64; 2]) -> Fate {
+    fn end(self, way: Way, k: f64, dt: f64, uniforms: [f64; 2]) -> End {
         if self == Self::Absorb {
             let is_met = way.to < 0.0 || uniforms[0] < way.touches();
-            return if is_met { Fate::Gone } else { Fate::At(way.to) };
+            let fate = if is_met { Fate::Gone } else { Fate::At(way.to) };
+            return End { fate, push: 0.0 };
         }
-        let push = (-way.lowest(uniforms[0])).max(0.0);
-        if push > 0.0 && k > 0.0 {
-            // L k / D, with D = s / (2 Δt).
-            let exponent = if way.spread > 0.0 { 2.0 * push * k * dt / way.spread } else { f64::INFINITY };
-            if uniforms[1] >= exp(-exponent) {
-                return Fate::Gone;
-            }
-        }
-        Fate::At((way.to + push).max(0.0))
+        let length = (-way.lowest(uniforms[0])).max(0.0);
+        // L / D, with D = s / (2 Δt).
+        let push = match length > 0.0 {
+            true if way.spread > 0.0 => 2.0 * length * dt / way.spread,
+            true => f64::INFINITY,
+            false => 0.0,
+        };
+        let is_lost = push > 0.0 && k > 0.0 && uniforms[1] >= exp(-(push * k));
+        let fate = if is_lost { Fate::Gone } else { Fate::At((way.to + length).max(0.0)) };
+        End { fate, push }
     }
 }
 
@@ -144,7 +176,7 @@ impl<const D: usize> Ends<D> {
         axis: usize,
         stride: &Stride<D, M>,
         lanes: &mut Lanes<D>,
-        exits: &mut Vec<Exit>,
+        met: &mut Met,
     ) {
         match self {
             Self::Periodic { low, high } => wrap(&mut lanes.positions[axis], *low, *high),
@@ -163,7 +195,7 @@ impl<const D: usize> Ends<D> {
                 if near != 0 {
                     for (end, wall) in walls.iter().enumerate() {
                         if let Some(wall) = wall {
-                            wall.meet([axis, end], near & !lanes.gone, stride, lanes, &spread, exits);
+                            wall.meet([axis, end], near & !lanes.gone, stride, lanes, &spread, met);
                         }
                     }
                 }
@@ -226,7 +258,7 @@ impl<const D: usize> Wall<D> {
         stride: &Stride<D, M>,
         lanes: &mut Lanes<D>,
         spread: &Lane,
-        exits: &mut Vec<Exit>,
+        met: &mut Met,
     ) {
         let sign = if end == 0 { 1.0 } else { -1.0 };
         let side = 2 * axis + end;
@@ -241,23 +273,32 @@ impl<const D: usize> Wall<D> {
             }
             let mut place: [f64; D] = std::array::from_fn(|other| lanes.positions[other][lane]);
             place[axis] = self.at;
-            let Some(patch) = self.patches.iter().position(|patch| patch.holds(&place, axis)) else {
-                continue;
-            };
-            let law = self.patches[patch].law;
+            // In a corner a place may lie beyond another side: what has no limits reaches there, too.
+            let found = self.patches.iter().position(|patch| patch.holds(&place, axis));
+            let Some(patch) = found.or_else(|| self.patches.len().checked_sub(1)) else { continue };
+            let Patch { low, high, law } = self.patches[patch];
+            for other in (0..D).filter(|&other| other != axis) {
+                place[other] = place[other].clamp(low[other], high[other]);
+            }
             let k = match law {
                 Law::Reflect | Law::Absorb => 0.0,
                 Law::Partial(rate) => rate,
-                Law::Outflow => (-sign * stride.medium.velocity(place, axis)).max(0.0),
+                Law::Outflow | Law::Wet => (-sign * stride.medium.velocity(place, axis)).max(0.0),
             } * stride.carrier.mobility;
             let uniforms = stride.draws.uniforms(lanes.ids[lane], stride.step, side as u64);
             let dt = stride.leap.time[lane];
-            match law.end(way, k, dt, [uniforms[0], uniforms[1]]) {
+            let End { fate, push } = law.end(way, k, dt, [uniforms[0], uniforms[1]]);
+            if law == Law::Wet && push > 0.0 {
+                let mut at = [0.0; 3];
+                at[..D].copy_from_slice(&place);
+                met.touches.push(Touch { lane, side, patch, push, place: at });
+            }
+            match fate {
                 Fate::At(distance) => lanes.positions[axis][lane] = self.at + sign * distance,
                 Fate::Gone => {
                     lanes.positions[axis][lane] = self.at;
                     lanes.gone |= 1 << lane;
-                    exits.push(Exit { lane, side, patch, fraction: way.meeting() });
+                    met.exits.push(Exit { lane, side, patch, fraction: way.meeting() });
                 }
             }
         }
@@ -280,11 +321,11 @@ mod tests {
     #[test]
     fn without_dispersion_walls_are_met_exactly() {
         let way = Way { from: 1.0, to: -0.5, spread: 0.0 };
-        assert!(matches!(Law::Absorb.end(way, 0.0, 1.0, [0.5; 2]), Fate::Gone));
-        assert!(matches!(Law::Outflow.end(way, 1.0, 1.0, [0.5; 2]), Fate::Gone));
-        assert!(matches!(Law::Reflect.end(way, 0.0, 1.0, [0.5; 2]), Fate::At(d) if d == 0.0));
+        assert!(matches!(Law::Absorb.end(way, 0.0, 1.0, [0.5; 2]).fate, Fate::Gone));
+        assert!(matches!(Law::Outflow.end(way, 1.0, 1.0, [0.5; 2]).fate, Fate::Gone));
+        assert!(matches!(Law::Reflect.end(way, 0.0, 1.0, [0.5; 2]).fate, Fate::At(d) if d == 0.0));
         let away = Way { to: 2.0, ..way };
-        assert!(matches!(Law::Absorb.end(away, 0.0, 1.0, [0.5; 2]), Fate::At(d) if d == 2.0));
+        assert!(matches!(Law::Absorb.end(away, 0.0, 1.0, [0.5; 2]).fate, Fate::At(d) if d == 2.0));
         assert!((way.meeting() - 2.0 / 3.0).abs() < 1e-15);
     }
 

@@ -8,7 +8,7 @@ use crate::plan::tape::Operation;
 use crate::plan::{Output, OutputKind, Plan, Side};
 
 pub(super) fn run(draft: &mut Draft) {
-    // Sides, sources and flows of masses have places along every axis.
+    // Sides, sources and flows of tracks have places along every axis.
     if draft.plan.transport.is_some() {
         return;
     }

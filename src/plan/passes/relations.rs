@@ -10,11 +10,12 @@
 //! stays in its bin have no relation but that of constants.
 
 use super::Draft;
-use super::species::retain_by;
+use super::species::{retain_by, retain_carried};
 use crate::diagnostic::number;
 use crate::maths::operator::{Binary, Unary};
 use crate::plan::chemistry::Method;
 use crate::plan::tape::{Operation, Register, Tape};
+use crate::plan::transport::{SideRule, Transport};
 use crate::plan::{Component, Plan};
 use std::collections::BTreeMap;
 
@@ -29,10 +30,13 @@ struct Affine {
 const TOLERANCE: f64 = 1e-12;
 
 pub(super) fn run(draft: &mut Draft) {
-    if draft.plan.transport.is_some() {
+    if draft.plan.carries_mass() {
         return;
     }
-    let forms: Vec<Affine> = draft.plan.components.iter().map(form_of).collect();
+    let mut forms: Vec<Affine> = draft.plan.components.iter().map(form_of).collect();
+    if let Some(transport) = &draft.plan.transport {
+        forms.iter_mut().enumerate().for_each(|(component, form)| add_sides(form, transport, component));
+    }
     let mut kept: Vec<usize> = Vec::new();
     // Of those that are kept, the ones that others may follow from.
     let mut still: Vec<usize> = Vec::new();
@@ -62,6 +66,35 @@ fn form_of(component: &Component) -> Affine {
         form.terms = form.terms.into_iter().map(|(name, value)| (format!("resting {name}"), value)).collect();
     }
     form
+}
+
+/// Adds what sides and wells bring: a relation must hold there, too, with the same constant.
+fn add_sides(form: &mut Affine, transport: &Transport, component: usize) {
+    let start = form.constant;
+    let mut add = |place: &str, other: Affine| {
+        let level = other.constant - start;
+        let shapes = other.terms.into_iter().map(|(name, value)| (format!("{place} {name}"), value));
+        form.terms.extend(shapes);
+        if level != 0.0 {
+            form.terms.insert(format!("{place} level"), level);
+        }
+    };
+    for (idx, patch) in transport.sides.iter().flatten().flatten().enumerate() {
+        match &patch.rule {
+            SideRule::Inflow(tapes) | SideRule::Held(tapes) => {
+                if let Some(tape) = tapes.get(component) {
+                    add(&format!("side {idx}"), affine_of(tape));
+                }
+            }
+            // Nothing comes in there, and what goes takes all components alike.
+            SideRule::Reflect | SideRule::Periodic | SideRule::Open | SideRule::Outflow => {}
+            // What is taken out of the water leaves it with less of all.
+            SideRule::Absorb | SideRule::Partial(_) => add("clean", Affine::default()),
+        }
+    }
+    if transport.injects() {
+        add("clean", Affine::default());
+    }
 }
 
 /// Whether reactions change a component in steps.
@@ -142,6 +175,9 @@ fn restore(draft: &mut Draft, relations: &[Option<Relation>], kept: &[usize]) {
     }
     let is_kept: Vec<bool> = relations.iter().map(Option::is_none).collect();
     retain_by(&mut draft.plan.components, &is_kept);
+    if let Some(transport) = &mut draft.plan.transport {
+        retain_carried(transport, &is_kept);
+    }
     let Some(chemistry) = &mut draft.plan.chemistry else { return };
     retain_by(&mut chemistry.floors, &is_kept);
     // What changes is kept; only its number is another one.

@@ -97,9 +97,11 @@ pub(super) fn remove(draft: &mut Draft, is_read: &[bool]) {
     retain_by(&mut plan.components, &is_carried);
     let new_component = |old: usize| is_carried[..old].iter().filter(|is_carried| **is_carried).count();
     if let Some(transport) = &mut plan.transport {
-        renumber_transport(transport, is_read, &renumbered);
-        let populations = transport.populations.iter();
-        plan.particles.count = populations.fold(0, |sum: u64, it| sum.saturating_add(it.count)).max(1);
+        renumber_transport(transport, is_read, &is_carried, &renumbered);
+        if !transport.is_of_fluid {
+            let populations = transport.populations.iter();
+            plan.particles.count = populations.fold(0, |sum: u64, it| sum.saturating_add(it.count)).max(1);
+        }
     }
     if let Some(chemistry) = &mut plan.chemistry {
         network::renumber(chemistry, &is_carried, &renumbered);
@@ -127,7 +129,12 @@ pub(super) fn remove(draft: &mut Draft, is_read: &[bool]) {
 
 /// Masses of species that nobody reads are not put in: no other species feels them. What becomes one of them is
 /// gone.
-fn renumber_transport(transport: &mut Transport, is_read: &[bool], renumbered: &[Option<usize>]) {
+fn renumber_transport(
+    transport: &mut Transport,
+    is_read: &[bool],
+    is_carried: &[bool],
+    renumbered: &[Option<usize>],
+) {
     if let Some(decay) = &mut transport.decay {
         retain_by(&mut decay.weights, is_read);
         decay.reactions.retain(|turn| is_read[turn.population]);
@@ -143,9 +150,15 @@ fn renumber_transport(transport: &mut Transport, is_read: &[bool], renumbered: &
     let of = |species: &mut usize| *species = renumbered[*species].unwrap_or(0);
     transport.populations.iter_mut().for_each(|population| of(&mut population.species));
     transport.sources.iter_mut().for_each(|source| of(&mut source.species));
+    let is_kept = if transport.is_of_fluid { is_carried } else { is_read };
+    retain_carried(transport, is_kept);
+}
+
+/// Keeps what sides bring of species, or of components.
+pub(super) fn retain_carried(transport: &mut Transport, is_kept: &[bool]) {
     for patch in transport.sides.iter_mut().flatten().flatten() {
         if let SideRule::Inflow(tapes) | SideRule::Held(tapes) = &mut patch.rule {
-            retain_by(tapes, is_read);
+            retain_by(tapes, is_kept);
         }
     }
 }

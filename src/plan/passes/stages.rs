@@ -6,11 +6,12 @@ use crate::plan::{Plan, Stage, ZoneRate};
 
 pub(super) fn run(draft: &mut Draft) {
     let plan = &draft.plan;
-    if plan.transport.is_some() {
+    if plan.carries_mass() {
         // Masses move and are looked at, whatever the scene.
         return;
     }
-    let moves = plan.walk.drift.iter().chain(&plan.walk.spread).any(|entry| *entry != 0.0);
+    let is_tracked = plan.transport.is_some();
+    let moves = plan.moves();
     let mixes = exchanges(plan);
     let reacts = plan.reacts_in_steps();
     // Then no particle reacts before the means of all are known.
@@ -46,6 +47,11 @@ pub(super) fn run(draft: &mut Draft) {
     }
     notes.push(("neighbour search", "no kernel interaction"));
     let mut stages = match (moves, mixes) {
+        // Parcels that come and go are no pass over memory: each stage has its own.
+        _ if is_tracked && is_coupled => vec![Stage::FusedReact, Stage::Move, Stage::Average],
+        _ if is_tracked && reacts => vec![Stage::React, Stage::Move],
+        (_, true) if is_tracked => vec![Stage::Mix, Stage::Move, Stage::Average],
+        _ if is_tracked => vec![Stage::Move],
         (true, _) if is_coupled => vec![Stage::FusedReact, Stage::FusedStep],
         (false, _) if is_coupled => vec![Stage::FusedReact, Stage::Average],
         (true, _) if reacts => vec![Stage::FusedStep],

@@ -5,7 +5,7 @@
 use super::super::check::Checker;
 use super::super::expression::Expr;
 use super::super::{OutputKind, Scenario};
-use super::{Dispersion, Flow, SideRule};
+use super::{Dispersion, Flow, Patch, SideRule};
 use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{M025, M026};
 use crate::source::Span;
@@ -63,62 +63,61 @@ fn moving_walls(scenario: &Scenario) -> Option<Span> {
     (has_walls || !is_uniform || !scenario.sources.is_empty()).then_some(scenario.domain.span)
 }
 
-/// What only masses can do so far.
+/// What only masses can do.
 fn of_fluid(checker: &mut Checker<'_>, scenario: &Scenario) {
-    let mut wrong: Vec<(String, Span)> = Vec::new();
-    for axis in &scenario.domain.axes {
-        for patch in axis.patches.iter().flatten() {
-            let word = match patch.rule {
-                SideRule::Reflect | SideRule::Periodic | SideRule::Open if patch.limits.is_empty() => {
-                    continue;
-                }
-                SideRule::Reflect | SideRule::Periodic | SideRule::Open => "parts of sides",
-                SideRule::Absorb | SideRule::Partial(_) => "sides that absorb",
-                SideRule::Outflow => "outflow",
-                SideRule::Inflow(_) => "inflow",
-                SideRule::Held(_) => "sides with a concentration",
-            };
-            wrong.push((word.to_owned(), patch.span));
-        }
-    }
+    let mut wrong: Vec<(&str, Span, &str)> = Vec::new();
+    const MASSES: &str = "write `particles mass` and a number: particles that carry mass can do this";
     if let Some(source) = scenario.sources.first() {
-        wrong.push(("sources".into(), source.span));
+        wrong.push(("sources", source.span, MASSES));
     }
-    match scenario.flow.as_ref().map(|flow| (&flow.value, flow.span)) {
-        Some((Flow::Expression(_) | Flow::Darcy(_) | Flow::File(_), span)) => {
-            wrong.push(("flow that varies in space".into(), span))
+    if let Some(span) = scenario.species.iter().find_map(|species| species.own_transport) {
+        wrong.push(("species with a retardation or diffusion of their own", span, MASSES));
+    }
+    let patches: Vec<&Patch> =
+        scenario.domain.axes.iter().flat_map(|axis| axis.patches.iter().flatten()).collect();
+    let brings = |patch: &&&Patch| matches!(patch.rule, SideRule::Inflow(_) | SideRule::Held(_));
+    let is_open = patches.iter().any(|patch| patch.rule == SideRule::Open);
+    if let Some(patch) = patches.iter().find(brings).filter(|_| is_open) {
+        let help = "let the `open` sides be `outflow`: what comes in must be able to go";
+        wrong.push(("sides that let water in beside `open` ones", patch.span, help));
+    }
+    let rests = |patch: &&&Patch| match &patch.rule {
+        SideRule::Inflow(list) | SideRule::Held(list) => {
+            list.iter().any(|(species, _)| scenario.species[*species].is_immobile)
         }
-        Some((Flow::Uniform(_), _)) | None => {}
+        _ => false,
+    };
+    if let Some(patch) = patches.iter().find(rests) {
+        let help = "leave the species that stays where it is out of this statement";
+        wrong.push(("water that brings what stays where it is", patch.span, help));
     }
-    if let Some(dispersion) = &scenario.dispersion
-        && matches!(dispersion.value, Dispersion::Isotropic(_))
+    let is_plain = |patch: &&Patch| {
+        patch.limits.is_empty()
+            && matches!(patch.rule, SideRule::Reflect | SideRule::Periodic | SideRule::Open)
+    };
+    if let Some(span) = moving_walls(scenario)
+        && !(is_uniform(scenario) && patches.iter().all(is_plain))
     {
-        wrong.push(("dispersion that varies in space".into(), dispersion.span));
+        let help = "leave `frame moving` out, or let the sides be `open`";
+        wrong.push(("walls that move with the frame", span, help));
     }
-    if let Some(medium) = &scenario.medium
-        && Expr::value(&medium.value).is_none()
-    {
-        wrong.push(("porosity that varies in space".into(), medium.span));
-    }
-    for species in &scenario.species {
-        if let Some(span) = species.own_transport {
-            wrong.push(("species with a retardation or diffusion of their own".into(), span));
-        }
-    }
-    // A side in a list of sides, a species in a list of species: one message for each kind.
-    let mut told: Vec<&str> = Vec::new();
-    for (what, span) in &wrong {
-        if told.contains(&what.as_str()) {
-            continue;
-        }
-        told.push(what);
+    for (what, span, help) in wrong {
         checker.report(
-            Diagnostic::error(M026, format!("fluid particles have no {what} yet"))
-                .at(*span, "not with particles of fluid")
+            Diagnostic::error(M026, format!("fluid particles have no {what}"))
+                .at(span, "not with particles of fluid")
                 .also(scenario.particles.kind_span, "particles of fluid")
-                .found(what.clone())
-                .expected("sides that are `reflect`, `periodic` or `open`, and what is the same everywhere")
-                .help("write `particles mass` and a number: particles that carry mass can do this"),
+                .found(what)
+                .expected("what parcels of water can do")
+                .help(help),
         );
     }
+}
+
+/// Whether coefficients are the same everywhere.
+fn is_uniform(scenario: &Scenario) -> bool {
+    let flow = scenario.flow.as_ref().map(|flow| &flow.value);
+    let dispersion = scenario.dispersion.as_ref().map(|dispersion| &dispersion.value);
+    matches!(flow, None | Some(Flow::Uniform(_)))
+        && !matches!(dispersion, Some(Dispersion::Isotropic(_)))
+        && scenario.medium.as_ref().is_none_or(|medium| Expr::value(&medium.value).is_some())
 }

@@ -1,0 +1,202 @@
+//! Blocks of parcels on their way through a step, in whatever medium.
+//!
+//! Owns the work on one block: it is called once per block, and compiled for each medium. May use the tracker and
+//! the books. It deliberately lets nothing in.
+
+use super::super::error::RunError;
+use super::super::mass::media::InMedium;
+use super::super::mass::world::Site;
+use super::super::parallel::Pool;
+use super::super::track::lanes::{LANES, Lane};
+use super::super::track::medium::{Carrier, Medium};
+use super::super::track::monitors::Crossing;
+use super::super::track::tracker::{Bench, Events, Steps, Tracker};
+use super::super::track::walls::{Exit, Touch};
+use super::book::Moved;
+use super::composition::{Composition, Rinse};
+use super::inlets::{self, Inlet};
+use super::{Passage, Trouble};
+use crate::maths::wide::Width;
+use crate::plan::transport::Patch;
+use crate::state::particles::Block;
+use std::sync::Arc;
+
+/// What moves parcels.
+pub trait Current<const D: usize>: Send + Sync {
+    /// Takes a block through a step, and those out of it that leave. `entered` is the part of the step that is over
+    /// when each comes in; nothing for parcels that have been there.
+    fn carry(&self, steps: Steps, entered: &[f64], block: &mut Block<D>, passage: &mut Passage);
+}
+
+/// A tracker in a medium, with what sides do to parcels.
+struct Course<const D: usize, M: Medium<D>> {
+    tracker: Tracker<D, M>,
+    /// Per side and part of it.
+    rinses: Vec<Vec<Rinse>>,
+    n_slots: usize,
+    benches: Pool<Bench<D, M>>,
+}
+
+/// What a site makes of its water.
+pub struct Launched<const D: usize> {
+    pub current: Arc<dyn Current<D>>,
+    pub inlets: Vec<Inlet<D>>,
+    /// Per component the lowest and highest value that sides give.
+    pub ranges: Vec<(f64, f64)>,
+}
+
+/// Makes the current of a site, and what comes in with it.
+pub struct Launch {
+    pub width: Width,
+    /// Of a parcel.
+    pub volume: f64,
+    /// Zones that are stored.
+    pub n_slots: usize,
+    /// Components that are carried.
+    pub n: usize,
+}
+
+impl<const D: usize> InMedium<D> for Launch {
+    type Output = Launched<D>;
+
+    fn go<M: Medium<D> + Send + 'static>(self, site: &Site<D>, medium: M) -> Result<Self::Output, RunError> {
+        let tracker = site.tracker(medium, self.width)?;
+        let inlets = inlets::inlets(site, &tracker, self.volume, self.n)?;
+        let axes: Vec<usize> = site.plan.axes.iter().map(|axis| axis.index).collect();
+        let sides = site.transport.sides.iter().flatten();
+        let of_side = |patches: &Vec<Patch>| {
+            patches.iter().map(|patch| Rinse::new(&patch.rule, self.n, &axes)).collect()
+        };
+        let rinses = sides.map(of_side).collect();
+        let course = Course { tracker, rinses, n_slots: self.n_slots, benches: Pool::new() };
+        let ranges = (0..self.n).map(|component| range(site, &axes, self.n, component)).collect();
+        Ok(Launched { current: Arc::new(course), inlets, ranges })
+    }
+}
+
+/// Lowest and highest value of a component at the sides; 0 is one of them.
+fn range<const D: usize>(site: &Site<D>, axes: &[usize], n: usize, component: usize) -> (f64, f64) {
+    let of_patch = |patch: &Patch| {
+        let composition = Composition::of_side(&patch.rule, n, axes);
+        composition.range(component, &patch.low, &patch.high)
+    };
+    let all = site.transport.sides.iter().flatten().flatten().map(of_patch);
+    all.fold((0.0, 0.0), |(lowest, highest): (f64, f64), (low, high)| (lowest.min(low), highest.max(high)))
+}
+
+impl<const D: usize, M: Medium<D> + Send + 'static> Current<D> for Course<D, M> {
+    fn carry(&self, steps: Steps, entered: &[f64], block: &mut Block<D>, passage: &mut Passage) {
+        self.benches.lend(
+            || Box::new(self.tracker.bench()),
+            |bench| {
+                self.tracker.width.run(OnBlock { course: self, steps, entered, block, bench, passage });
+            },
+        );
+    }
+}
+
+/// One block, to be dispatched to wide or narrow code.
+struct OnBlock<'a, const D: usize, M: Medium<D>> {
+    course: &'a Course<D, M>,
+    steps: Steps,
+    entered: &'a [f64],
+    block: &'a mut Block<D>,
+    bench: &'a mut Bench<D, M>,
+    passage: &'a mut Passage,
+}
+
+impl<const D: usize, M: Medium<D>> pulp::NullaryFnOnce for OnBlock<'_, D, M> {
+    type Output = ();
+
+    /// Takes 64 parcels at a time; those that stay close up.
+    #[inline(always)]
+    fn call(self) {
+        let Self { course, steps, entered, block, bench, passage } = self;
+        let n = block.n_particles;
+        let mut kept = 0;
+        bench.displacements = 0;
+        for first in (0..n).step_by(LANES) {
+            let range = first..(first + LANES).min(n);
+            let late = entered.get(range.clone()).map(lane_of);
+            bench
+                .lanes
+                .load(&block.ids[range.clone()], block.positions.each_ref().map(|x| &x[range.clone()]));
+            let mut log = Log {
+                rinses: &course.rinses,
+                n_slots: course.n_slots,
+                first,
+                n_axes: D,
+                columns: &mut block.columns,
+                moved: &mut passage.moved,
+            };
+            if let Err(problem) =
+                course.tracker.advance(&Carrier::WATER, steps, late.as_ref(), bench, &mut log)
+            {
+                passage.trouble.get_or_insert(Trouble::SubSteps(problem));
+            }
+            let lanes = &bench.lanes;
+            for lane in 0..range.len() {
+                if lanes.gone >> lane & 1 == 1 {
+                    continue;
+                }
+                for axis in 0..D {
+                    let x = lanes.positions[axis][lane];
+                    if !x.is_finite() {
+                        let id = lanes.ids[lane];
+                        passage.trouble.get_or_insert(Trouble::Position { id, step: steps.first });
+                    }
+                    block.positions[axis][kept] = x;
+                }
+                if kept != first + lane {
+                    block.take_over(kept, first + lane);
+                }
+                kept += 1;
+            }
+        }
+        block.truncate(kept);
+        passage.displacements += bench.displacements;
+    }
+}
+
+/// Parts of a step of a group; none of it for the rest of the lanes.
+fn lane_of(entered: &[f64]) -> Lane {
+    let mut lane = [0.0; LANES];
+    lane[..entered.len()].copy_from_slice(entered);
+    lane
+}
+
+/// What happens to a group on its way.
+struct Log<'a> {
+    rinses: &'a [Vec<Rinse>],
+    n_slots: usize,
+    /// Place of the group in its block.
+    first: usize,
+    n_axes: usize,
+    columns: &'a mut [Vec<f64>],
+    moved: &'a mut Moved,
+}
+
+/// The door of a side, or of a well that is counted on behind the sides.
+fn door(side: usize) -> usize {
+    1 + side
+}
+
+impl Events for Log<'_> {
+    fn left(&mut self, _: u64, exit: Exit, _: f64) {
+        self.moved.leave(door(exit.side), self.columns, self.first + exit.lane);
+    }
+
+    fn crossed(&mut self, _: u64, _: usize, _: Crossing, _: f64) {}
+
+    fn touched(&mut self, touch: &Touch) {
+        let rinse = &self.rinses[touch.side][touch.patch];
+        let place = &touch.place[..self.n_axes];
+        let idx = self.first + touch.lane;
+        for (column_idx, column) in self.columns.iter_mut().enumerate() {
+            let before = column[idx];
+            let after = rinse.after(column_idx / self.n_slots, before, touch.push, place);
+            column[idx] = after;
+            self.moved.change(door(touch.side), column_idx, after - before);
+        }
+    }
+}
