@@ -66,6 +66,12 @@ fn time<const D: usize, M: Medium<D>>(name: &str, medium: M, high: [f64; D], dt:
     let ids: Vec<u64> = (0..n).collect();
     let mut positions: [Vec<f64>; D] =
         std::array::from_fn(|axis| ids.iter().map(|_| next() * high[axis]).collect());
+    if name.contains("sorted") {
+        let mut order: Vec<usize> = (0..ids.len()).collect();
+        let cell = |x: f64| (x * 2.0) as usize;
+        order.sort_by_key(|&idx| positions.each_ref().map(|axis| cell(axis[idx])));
+        positions = positions.map(|axis| order.iter().map(|&idx| axis[idx]).collect());
+    }
     let width = Width::widest();
     let draws = Draws::new(42, D, false);
     let tracker = Tracker {
@@ -122,7 +128,9 @@ fn main() {
     time("uniform, 2-D", uniform, [200.0, 80.0], 100.0);
     let dispersivity = Dispersivity { longitudinal: 0.5, transverse: 0.05, molecular: 1e-9 };
     let medium = CellMedium::<2>::new(&flow([400, 160, 1]), [0, 1], dispersivity).expect("medium");
-    time("400 x 160 cells, 2-D", medium, [200.0, 80.0], 1000.0);
+    time("400 x 160 cells, 2-D", medium.clone(), [200.0, 80.0], 1000.0);
+    time("400 x 160 cells, 2-D, sorted", medium, [200.0, 80.0], 1000.0);
     let medium = CellMedium::<3>::new(&flow([100, 50, 50]), [0, 1, 2], dispersivity).expect("medium");
-    time("100 x 50 x 50 cells, 3-D", medium, [50.0, 25.0, 25.0], 1000.0);
+    time("100 x 50 x 50 cells, 3-D", medium.clone(), [50.0, 25.0, 25.0], 1000.0);
+    time("100 x 50 x 50 cells, 3-D, sorted", medium, [50.0, 25.0, 25.0], 1000.0);
 }

@@ -11,6 +11,8 @@ use crate::flow::FaceFlow;
 
 /// Corners of a cell in three dimensions.
 const CORNERS: usize = 8;
+/// Numbers that are read together.
+const GROUP: usize = 4;
 /// Fours of numbers that a particle reads there.
 const MOST_QUADS: usize = n_quads::<3>();
 
@@ -29,7 +31,7 @@ pub struct CellMedium<const D: usize> {
     strides: [usize; D],
     /// Per cell what a particle in it reads: pore velocities through the lower and the upper face of each axis,
     /// then those at the corners (last axis fastest), component by component, m/s; four at a time.
-    quads: Vec<[f32; 4]>,
+    quads: Vec<[f32; GROUP]>,
     dispersivity: Dispersivity,
 }
 
@@ -54,8 +56,6 @@ pub struct Look<const D: usize> {
     /// Pore velocity of the faces, over R, m/s.
     speed: [Narrow; D],
     around: Around<D>,
-    /// Per component and axis the gradient, while it is worked out.
-    slopes: [[[Narrow; CORNERS / 2]; D]; D],
 }
 
 impl<const D: usize> CellMedium<D> {
@@ -97,14 +97,23 @@ impl<const D: usize> CellMedium<D> {
             }
         }
         number(place, &self.strides, index);
-        for lane in 0..LANES {
-            let first = index[lane] as usize * n_quads::<D>();
-            let record = &self.quads[first..first + n_quads::<D>()];
-            for (q, own) in record.iter().enumerate() {
-                quads[4 * q][lane] = own[0];
-                quads[4 * q + 1][lane] = own[1];
-                quads[4 * q + 2][lane] = own[2];
-                quads[4 * q + 3][lane] = own[3];
+        // Four particles at a time, so that sixteen numbers are turned round in registers.
+        let (groups, _) = index.as_chunks::<GROUP>();
+        for (group, cells) in groups.iter().enumerate() {
+            // Loops: what is handed to a function is not compiled wide.
+            let mut records: [&[[f32; GROUP]]; GROUP] = [&[]; GROUP];
+            for lane in 0..GROUP {
+                let first = cells[lane] as usize * n_quads::<D>();
+                records[lane] = &self.quads[first..first + n_quads::<D>()];
+            }
+            for q in 0..n_quads::<D>() {
+                for k in 0..GROUP {
+                    let mut turned = [0.0; GROUP];
+                    for lane in 0..GROUP {
+                        turned[lane] = records[lane][q][k];
+                    }
+                    quads[GROUP * q + k].as_chunks_mut::<GROUP>().0[group] = turned;
+                }
             }
         }
     }
@@ -227,9 +236,7 @@ struct Around<const D: usize> {
     fraction: [Narrow; D],
     index: [i32; LANES],
     /// The records of the cells, four numbers at a time.
-    quads: [Narrow; 4 * MOST_QUADS],
-    /// One component at the corners, while it is worked out.
-    values: [Narrow; CORNERS],
+    quads: [Narrow; GROUP * MOST_QUADS],
 }
 
 impl<const D: usize> Around<D> {
@@ -239,8 +246,7 @@ impl<const D: usize> Around<D> {
             place: [[0; LANES]; D],
             fraction: [[0.0; LANES]; D],
             index: [0; LANES],
-            quads: [[0.0; LANES]; 4 * MOST_QUADS],
-            values: [[0.0; LANES]; CORNERS],
+            quads: [[0.0; LANES]; GROUP * MOST_QUADS],
         }
     }
 
@@ -257,48 +263,75 @@ impl<const D: usize> Around<D> {
         low + self.fraction[axis][lane] * (high - low)
     }
 
-    /// One component between the corners, left in `values[0]`, and its gradient in `slopes[axis][0]`.
+    /// One component between the corners, and its gradient.
     ///
     /// - Equation: multilinear interpolation, one axis after the other from the last.
     /// - Symbols: fractions of the cell along each axis; gradients over `1 / inverse_width`.
     /// - Range: fractions from 0 to 1.
     /// - Source: methods, section 1.3 (LaBolle et al. 1996, doi:10.1029/95WR03528).
-    /// - Shape: 64 lanes, one loop over them for each pair of corners.
+    /// - Shape: one particle; the loop over lanes around it is one loop.
     #[inline(always)]
-    fn between(
-        &mut self,
-        component: usize,
-        inverse_width: &[f32; D],
-        slopes: &mut [[Narrow; CORNERS / 2]; D],
-    ) {
-        let last = D - 1;
-        for k in 0..1_usize << last {
-            let first = 2 * D + 2 * k * D + component;
-            for lane in 0..LANES {
-                let (low, high) = (self.at(first, lane), self.at(first + D, lane));
-                let step = high - low;
-                slopes[last][k][lane] = step * inverse_width[last];
-                self.values[k][lane] = low + self.fraction[last][lane] * step;
-            }
+    fn between(&self, component: usize, inverse_width: &[f32; D], lane: usize) -> (f32, [f32; D]) {
+        let first = 2 * D + component;
+        let mut c = [0.0; CORNERS];
+        for corner in 0..1_usize << D {
+            c[corner] = self.at(first + corner * D, lane);
         }
-        for axis in (0..last).rev() {
-            let u = &self.fraction[axis];
-            for k in 0..1_usize << axis {
-                for other in axis + 1..D {
-                    for lane in 0..LANES {
-                        let (low, high) = (slopes[other][2 * k][lane], slopes[other][2 * k + 1][lane]);
-                        slopes[other][k][lane] = low + u[lane] * (high - low);
-                    }
-                }
-                for lane in 0..LANES {
-                    let (low, high) = (self.values[2 * k][lane], self.values[2 * k + 1][lane]);
-                    let step = high - low;
-                    slopes[axis][k][lane] = step * inverse_width[axis];
-                    self.values[k][lane] = low + u[lane] * step;
-                }
-            }
+        let mut u = [0.0; D];
+        for axis in 0..D {
+            u[axis] = self.fraction[axis][lane];
         }
+        let mut slope = [0.0; D];
+        // Written out: loops whose length hangs on a loop around them would keep the lanes apart.
+        let value = match D {
+            1 => {
+                let along = Edge::new(c[0], c[1], u[0]);
+                slope[0] = along.step * inverse_width[0];
+                along.value
+            }
+            2 => {
+                let ends = [Edge::new(c[0], c[1], u[1]), Edge::new(c[2], c[3], u[1])];
+                let (value, slopes) = face(ends, u[0], [inverse_width[0], inverse_width[1]]);
+                (slope[0], slope[1]) = (slopes[0], slopes[1]);
+                value
+            }
+            _ => {
+                let width = [inverse_width[1], inverse_width[2]];
+                let low = [Edge::new(c[0], c[1], u[2]), Edge::new(c[2], c[3], u[2])];
+                let high = [Edge::new(c[4], c[5], u[2]), Edge::new(c[6], c[7], u[2])];
+                let (low, high) = (face(low, u[1], width), face(high, u[1], width));
+                let along = Edge::new(low.0, high.0, u[0]);
+                slope[0] = along.step * inverse_width[0];
+                slope[1] = Edge::new(low.1[0], high.1[0], u[0]).value;
+                slope[2] = Edge::new(low.1[1], high.1[1], u[0]).value;
+                along.value
+            }
+        };
+        (value, slope)
     }
+}
+
+/// Between two numbers.
+#[derive(Clone, Copy)]
+struct Edge {
+    value: f32,
+    step: f32,
+}
+
+impl Edge {
+    #[inline(always)]
+    fn new(low: f32, high: f32, u: f32) -> Self {
+        let step = high - low;
+        Self { value: low + u * step, step }
+    }
+}
+
+/// Between two edges: the value, and the gradient across them and along them.
+#[inline(always)]
+fn face(ends: [Edge; 2], u: f32, inverse_width: [f32; 2]) -> (f32, [f32; 2]) {
+    let across = Edge::new(ends[0].value, ends[1].value, u);
+    let along = Edge::new(ends[0].step * inverse_width[1], ends[1].step * inverse_width[1], u);
+    (across.value, [across.step * inverse_width[0], along.value])
 }
 
 impl<const D: usize> Medium<D> for CellMedium<D> {
@@ -312,7 +345,6 @@ impl<const D: usize> Medium<D> for CellMedium<D> {
             direction: [[0.0; LANES]; D],
             speed: [[0.0; LANES]; D],
             around: Around::new(),
-            slopes: [[[[0.0; LANES]; CORNERS / 2]; D]; D],
         }
     }
 
@@ -326,7 +358,7 @@ impl<const D: usize> Medium<D> for CellMedium<D> {
     /// - Shape: 64 particles.
     #[inline(always)]
     fn look(&self, carrier: &Carrier, positions: &[Lane; D], look: &mut Look<D>) {
-        let Look { around, slopes, .. } = look;
+        let Look { drift, along: root_along, across: root_across, direction, speed, around } = look;
         self.gather(positions, around);
         let mobility = carrier.mobility as f32;
         let along = self.dispersivity.longitudinal as f32;
@@ -336,46 +368,38 @@ impl<const D: usize> Medium<D> for CellMedium<D> {
         for axis in 0..D {
             inverse_width[axis] = self.ruler[axis].inverse_width as f32;
         }
-        for component in 0..D {
-            around.between(component, &inverse_width, &mut slopes[component]);
-            look.direction[component] = around.values[0];
-        }
-        let mut speed = [0.0_f32; LANES];
         for lane in 0..LANES {
+            let (mut n, mut slopes) = ([0.0_f32; D], [[0.0_f32; D]; D]);
             let mut square = f32::MIN_POSITIVE;
             for i in 0..D {
-                square += look.direction[i][lane] * look.direction[i][lane];
+                (n[i], slopes[i]) = around.between(i, &inverse_width, lane);
+                square += n[i] * n[i];
             }
-            speed[lane] = square.sqrt();
-            let inverse = 1.0 / speed[lane];
+            let magnitude = square.sqrt();
+            let inverse = 1.0 / magnitude;
+            let mut speed_slope = [0.0_f32; D];
+            let mut rest = 0.0;
             for i in 0..D {
-                look.direction[i][lane] *= inverse;
+                n[i] *= inverse;
+                direction[i][lane] = n[i];
             }
-            look.along[lane] = (2.0 * mobility * (along * speed[lane] + molecular)).sqrt();
-            look.across[lane] = (2.0 * mobility * (across * speed[lane] + molecular)).sqrt();
-        }
-        let mut speed_slope = [[0.0_f32; LANES]; D];
-        let mut rest = [0.0_f32; LANES];
-        for i in 0..D {
-            for lane in 0..LANES {
-                let mut sum = 0.0;
+            for i in 0..D {
                 for k in 0..D {
-                    sum += look.direction[k][lane] * slopes[k][i][0][lane];
+                    speed_slope[i] += n[k] * slopes[k][i];
                 }
-                speed_slope[i][lane] = sum;
-                rest[lane] += slopes[i][i][0][lane] - look.direction[i][lane] * sum;
+                rest += slopes[i][i] - n[i] * speed_slope[i];
             }
-        }
-        for i in 0..D {
-            for lane in 0..LANES {
-                let mut turning = look.direction[i][lane] * rest[lane];
+            root_along[lane] = (2.0 * mobility * (along * magnitude + molecular)).sqrt();
+            root_across[lane] = (2.0 * mobility * (across * magnitude + molecular)).sqrt();
+            for i in 0..D {
+                let mut turning = n[i] * rest;
                 for j in 0..D {
-                    turning += look.direction[j][lane] * slopes[i][j][0][lane];
+                    turning += n[j] * slopes[i][j];
                 }
-                let spreading = across * speed_slope[i][lane] + (along - across) * turning;
+                let spreading = across * speed_slope[i] + (along - across) * turning;
                 let flow = around.between_faces(i, lane);
-                look.speed[i][lane] = flow * mobility;
-                look.drift[i][lane] = (flow + spreading) * mobility;
+                speed[i][lane] = flow * mobility;
+                drift[i][lane] = (flow + spreading) * mobility;
             }
         }
     }
