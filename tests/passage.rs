@@ -56,6 +56,7 @@ fn scene(
         decay: None,
         sub_steps: None,
         interfaces: vec![],
+        order: None,
     };
     let base = plain((0..n_axes).map(axis).collect(), walk(n_axes, 0.0), N, duration, step);
     Plan { transport: Some(transport), ..base }

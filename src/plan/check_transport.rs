@@ -24,6 +24,11 @@ impl Plan {
         self.check_populations(transport)?;
         let is_right = transport.interfaces.iter().all(|it| it.axis < n_axes && it.at.is_finite());
         require(is_right, || "an interface lies on no axis".into())?;
+        let is_right = transport.order.as_ref().is_none_or(|order| {
+            let n = order.tiles.iter().try_fold(1_usize, |n, &along| n.checked_mul(along));
+            order.tiles.len() == n_axes && n.is_some_and(|n| (1..=usize::from(u16::MAX)).contains(&n))
+        });
+        require(is_right, || "tiles do not fit the axes".into())?;
         let criteria = transport.sub_steps.map_or([1.0; 2], |sub| [sub.courant, sub.dispersion]);
         require(criteria.iter().all(|c| *c > 0.0 && c.is_finite()), || {
             "a criterion of sub-steps is none".into()

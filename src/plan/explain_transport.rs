@@ -48,6 +48,14 @@ pub(super) fn lines(plan: &Plan) -> Vec<String> {
             number(sub_steps.dispersion)
         ),
     });
+    if let Some(order) = &transport.order {
+        let tiles: Vec<String> = order.tiles.iter().map(ToString::to_string).collect();
+        lines.push(format!(
+            "memory: particles are sorted by {} tiles about every {} displacements",
+            tiles.join(" x "),
+            order.displacements
+        ));
+    }
     lines
 }
 

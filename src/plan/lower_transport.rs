@@ -132,6 +132,7 @@ impl Lowering<'_> {
             decay,
             sub_steps: None,
             interfaces,
+            order: None,
         };
         if is_of_fluid {
             return Some(transport);

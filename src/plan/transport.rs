@@ -35,6 +35,19 @@ pub struct Transport {
     pub sub_steps: Option<SubSteps>,
     /// Planes normal to an axis at which coefficients jump.
     pub interfaces: Vec<Interface>,
+    /// How particles lie in memory; absent where it does not matter.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub order: Option<Order>,
+}
+
+/// Particles of one tile lie side by side in memory.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Order {
+    /// Equal parts of the domain along each active axis; at most 65,535 in all.
+    pub tiles: Vec<usize>,
+    /// Displacements of a particle, on average, from one sorting to the next.
+    pub displacements: u64,
 }
 
 #[allow(clippy::trivially_copy_pass_by_ref)] // serde asks for a reference.

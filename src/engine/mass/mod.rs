@@ -13,6 +13,7 @@ mod inlets;
 mod march;
 pub(super) mod media;
 mod observe;
+mod order;
 mod parts;
 pub(super) mod place;
 pub(super) mod release;

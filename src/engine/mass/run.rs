@@ -19,6 +19,7 @@ use super::book::{Book, Event};
 use super::flock::{self, Flock};
 use super::gate::Gates;
 use super::observe::Scene;
+use super::order::Order;
 use super::release::{Birth, Kind, Release, Window};
 use super::units::Units;
 use super::world::Site;
@@ -52,6 +53,8 @@ pub struct Run<'a, const D: usize, M: Medium<D>> {
     pub gates: Gates,
     pub benches: Pool<Bench<D, M>>,
     pub displacements: u64,
+    /// Absent where it does not matter how particles lie in memory.
+    order: Option<Order<D>>,
 }
 
 /// Runs in a medium.
@@ -142,6 +145,7 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
             flocks: Vec::new(),
             benches: Pool::new(),
             displacements: 0,
+            order: Order::new(site),
             site,
             tracker,
             paces: chain.as_ref().map_or_else(Vec::new, |chain| chain.carriers(&site.carriers())),
@@ -175,7 +179,12 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
     /// Takes everything through steps of equal length.
     fn tile(&mut self, first: u64, end: u64) -> Result<(), RunError> {
         let time = &self.site.plan.time;
-        self.advance(Steps { first, end, t: first as f64 * time.step, dt: step_length(time, first) })
+        let before = self.displacements;
+        self.advance(Steps { first, end, t: first as f64 * time.step, dt: step_length(time, first) })?;
+        if let Some(order) = &mut self.order {
+            order.moved(self.displacements - before, &mut self.flocks);
+        }
+        Ok(())
     }
 
     fn advance(&mut self, steps: Steps) -> Result<(), RunError> {

@@ -5,6 +5,7 @@
 
 mod axes;
 mod network;
+mod order;
 mod outputs;
 mod relations;
 mod species;
@@ -60,6 +61,8 @@ pub const PASSES: &[Pass] = &[
     Pass { name: "relations", run: relations::run, keeps_bytes: false },
     // After relations: fewer fields, fewer gradients. Other particles are drawn: equal in law only.
     Pass { name: "axes", run: axes::run, keeps_bytes: false },
+    // Where particles lie in memory hangs on the flow alone.
+    Pass { name: "order", run: order::run, keeps_bytes: true },
     // Last: decides from what is left which work a step has, and joins it into one pass over memory.
     Pass { name: "stages", run: stages::run, keeps_bytes: true },
 ];
