@@ -38,11 +38,12 @@ pub(super) fn run(draft: &mut Draft) {
     draft.leave_out("sorting of particles by cell", reason);
 }
 
-/// Cells along each axis of a flow that is solved for.
+/// Cells along each axis of a flow that has some.
 fn cells(plan: &Plan) -> Option<Vec<usize>> {
     match &plan.transport.as_ref()?.flow {
         Flow::Darcy(darcy) => Some(darcy.cells.clone()),
-        Flow::Uniform(_) | Flow::Expression(_) | Flow::File(_) => None,
+        Flow::File(file) => Some(file.facts.cells.clone()),
+        Flow::Uniform(_) | Flow::Expression(_) => None,
     }
 }
 
