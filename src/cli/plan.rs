@@ -60,6 +60,14 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
     Ok(if any_fatal(&checked.diagnostics) { Exit::SceneWrong } else { Exit::Done })
 }
 
+/// The files of numbers that the scene reads, as a section of the plan.
+fn files_of_numbers(checked: &Checked) -> String {
+    let files = super::data::named_data(&checked.sources);
+    let lines = files.iter().map(|file| format!("  {}, BLAKE3 {}\n", file.name, file.hash));
+    let lines: String = lines.collect();
+    if lines.is_empty() { lines } else { format!("\nfiles of numbers\n{lines}") }
+}
+
 /// What was asked for, if the scene came that far.
 fn product(arguments: &Arguments, checked: &Checked) -> Option<String> {
     let compiled = checked.compiled.as_ref();
@@ -76,7 +84,9 @@ fn product(arguments: &Arguments, checked: &Checked) -> Option<String> {
         }
         None => compiled.map(|compiled| {
             let title = scenario.and_then(|scenario| scenario.title.as_deref());
-            explain(compiled, &display_name(&arguments.file), title)
+            let mut text = explain(compiled, &display_name(&arguments.file), title);
+            text.push_str(&files_of_numbers(checked));
+            text
         }),
     }
 }

@@ -4,6 +4,7 @@
 //! between and beyond its rows. May use the words. It deliberately opens no file and knows no statement: bytes and
 //! columns are given.
 
+pub mod cloud;
 pub mod columns;
 pub mod csv;
 pub mod error;
@@ -12,6 +13,7 @@ mod grid;
 pub mod parquet;
 pub mod table;
 
+pub use cloud::Cloud;
 pub use columns::{Column, Columns, MAX_NUMBERS};
 pub use error::{Kind, Place, ReadError};
 pub use file::DataFile;

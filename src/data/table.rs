@@ -36,7 +36,7 @@ pub enum Lookup {
 }
 
 /// Values on a grid.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Table {
     axes: Vec<Vec<f64>>,
     /// The last axis fastest.
@@ -225,6 +225,13 @@ fn hash(axes: &[Vec<f64>], values: &[f64], rule: Rule) -> String {
 impl PartialEq for Table {
     fn eq(&self, other: &Self) -> bool {
         self.hash == other.hash
+    }
+}
+
+impl std::fmt::Debug for Table {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let shape: Vec<String> = self.axes.iter().map(|axis| axis.len().to_string()).collect();
+        write!(f, "{:?} table of {}, {}", self.rule, shape.join(" x "), self.hash)
     }
 }
 

@@ -139,6 +139,7 @@ codes! {
     T102 "the rows of a table make no function",
     T103 "a table is asked beyond its rows",
     T104 "a table may be asked beyond its rows",
+    T105 "the rows of a table are no source",
     N101 "means over few particles are mostly noise",
     N102 "the step is coarse for a mixing zone",
     N103 "the bins add dispersion",

@@ -61,7 +61,7 @@ impl Plan {
             Region::Line(a, b) | Region::Box(a, b) | Region::Gaussian(a, b) => {
                 a.len() == n_axes && b.len() == n_axes
             }
-            Region::Table(columns) => columns.len() == n_axes + 1,
+            Region::Table(cloud) => cloud.n_axes() == n_axes,
         };
         require(is_right && source.species < self.species.len(), wrong)?;
         let (Strength::Pulse(value) | Strength::Rate(value) | Strength::Held(value)) = source.strength;

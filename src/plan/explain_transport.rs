@@ -230,7 +230,7 @@ fn source_line(plan: &Plan, source: &Source) -> String {
         Region::Gaussian(centre, deviation) => {
             format!("in a Gaussian about ({}) m with ({}) m", list(centre), list(deviation))
         }
-        Region::Table(columns) => format!("at {} places", columns.first().map_or(0, Vec::len)),
+        Region::Table(cloud) => format!("at the {} places of a table", cloud.n_rows()),
     };
     let unit =
         if plan.species.get(source.species).is_some_and(|species| species.is_molar) { "mol" } else { "kg" };

@@ -331,11 +331,14 @@ impl Lowering<'_> {
 
     fn source(&self, source: &written::Source) -> Source {
         let along = |all| self.along_axes(all);
-        let region = match source.region {
-            written::Region::Point(at) => Region::Point(along(at)),
-            written::Region::Line(from, to) => Region::Line(along(from), along(to)),
-            written::Region::Box(low, high) => Region::Box(along(low), along(high)),
-            written::Region::Gaussian(centre, deviation) => Region::Gaussian(along(centre), along(deviation)),
+        let region = match &source.region {
+            written::Region::Point(at) => Region::Point(along(*at)),
+            written::Region::Line(from, to) => Region::Line(along(*from), along(*to)),
+            written::Region::Box(low, high) => Region::Box(along(*low), along(*high)),
+            written::Region::Gaussian(centre, deviation) => {
+                Region::Gaussian(along(*centre), along(*deviation))
+            }
+            written::Region::Table(cloud) => Region::Table(cloud.clone()),
         };
         let strength = match source.strength {
             written::Strength::Pulse(amount) => Strength::Pulse(amount),

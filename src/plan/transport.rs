@@ -4,11 +4,13 @@
 //! particles are moved by the engine.
 
 use super::tape::Tape;
+use crate::data::{Cloud, cloud};
 pub use crate::scenario::Covariance;
 pub use crate::scenario::transport::flow_file::{
     FileColumn, FileForm, FlowFacts, FlowFile, ModflowForm, NamedFile, Outlet, TableForm, Velocity,
 };
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Transport in anything but uniform flow between simple sides, or of particles that carry mass.
 ///
@@ -232,8 +234,8 @@ pub enum Region {
     Box(Vec<f64>, Vec<f64>),
     /// Centre and standard deviation per active axis, m.
     Gaussian(Vec<f64>, Vec<f64>),
-    /// Places and masses of a table, in its order: positions one after the other, then the mass.
-    Table(Vec<Vec<f64>>),
+    /// Places of a table along the active axes, with what each gives.
+    Table(#[serde(with = "cloud::shared")] Arc<Cloud>),
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

@@ -24,7 +24,7 @@ const MAX_COLUMNS: usize = 256;
 
 /// A table whose file could be read.
 #[derive(Clone)]
-pub(super) struct Known {
+pub(in crate::scenario) struct Known {
     pub file: Arc<DataFile>,
     pub columns: Arc<Vec<Column>>,
     pub rule: Rule,
@@ -144,6 +144,22 @@ impl<'a> Checker<'a> {
         let Origin::Data(statement) = entry.origin else { return None };
         entry.n_uses += 1;
         Some(statement)
+    }
+
+    /// The table and the column that a path such as `cloud.m` means, without a call.
+    pub(super) fn column_of(&mut self, expr: &'a tree::Expr) -> Option<(&'a tree::Data, Known, usize)> {
+        let tree::ExprKind::Path(path) = &expr.kind else { return None };
+        let [table, column] = &path[..] else { return None };
+        let statement = self.table_of(&table.value)?;
+        let known = self.tables.get(&table.value)?.clone()?;
+        let idx = known.column(&column.value)?;
+        Some((statement, known, idx))
+    }
+
+    /// What kind of value such a column has.
+    pub(super) fn kind_of_column(&mut self, expr: &'a tree::Expr) -> Option<Type> {
+        let (_, known, idx) = self.column_of(expr)?;
+        Some(Type::Number(known.columns[idx].unit.dimension))
     }
 
     /// A column of a table as a function of the leading columns, as many as there are arguments.

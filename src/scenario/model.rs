@@ -213,8 +213,12 @@ fn infer_dimensions<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) 
         if checker.species_dimensions[idx].is_some() {
             continue;
         }
-        let Some(value) = checker.check(&assignment.value, Allow::PLACE) else { continue };
-        checker.species_dimensions[idx] = match value.kind {
+        let kind = match checker.kind_of_column(&assignment.value) {
+            Some(kind) => Some(kind),
+            None => checker.check(&assignment.value, Allow::PLACE).map(|value| value.kind),
+        };
+        let Some(kind) = kind else { continue };
+        checker.species_dimensions[idx] = match kind {
             Type::Number(dimension) if is_concentration => {
                 Some(dimension).filter(|dimension| dimension.is_concentration())
             }

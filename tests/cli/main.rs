@@ -3,6 +3,7 @@
 mod basics;
 mod error_bars;
 mod files;
+mod numbers;
 mod overhead;
 mod program;
 mod runs;

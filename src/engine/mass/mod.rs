@@ -21,6 +21,7 @@ mod run;
 mod shape;
 mod sides;
 mod sources;
+mod spots;
 mod turn;
 mod units;
 mod water;

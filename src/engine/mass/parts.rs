@@ -49,7 +49,6 @@ impl<const D: usize> Part<D> {
         let n = (self.mass / unit).round().max(1.0);
         let (unit, kind) = match self.shape {
             Shape::Steady { from, to, sampling } => {
-                let n = if let Place::List(list) = &self.place { list.len() as f64 } else { n };
                 (self.mass / n, Kind::Steady { n: n as u64, from, to, sampling })
             }
             Shape::Held { per_step, entry, axis, sign } => (

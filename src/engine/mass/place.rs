@@ -3,6 +3,7 @@
 //! Owns the map from a share of a mass to a place. May use `maths`. It deliberately draws nothing: shares and
 //! uniform numbers are given.
 
+use super::spots::Spots;
 use crate::maths::scalar::{cos, ln, sin};
 
 /// Mass spread over places.
@@ -15,8 +16,7 @@ pub enum Place<const D: usize> {
     Gaussian([f64; D], [f64; D], [Tail; D]),
     Cells(Cells<D>),
     Faces(Faces<D>),
-    /// One place per particle.
-    List(Vec<[f64; D]>),
+    Spots(Spots<D>),
 }
 
 /// What becomes of what lies beyond the two sides of an axis: it is mirrored where there is a wall, and comes in
@@ -135,7 +135,7 @@ fn shape<const D: usize>(low: [f64; D], high: [f64; D]) -> [usize; D] {
 }
 
 /// The first index whose cumulative sum is above a value, and the part of it that is below.
-fn find(cumulative: &[f64], wanted: f64) -> (usize, f64) {
+pub(super) fn find(cumulative: &[f64], wanted: f64) -> (usize, f64) {
     let idx = cumulative.partition_point(|&sum| sum <= wanted).min(cumulative.len().saturating_sub(1));
     let before = if idx == 0 { 0.0 } else { cumulative[idx - 1] };
     let own = cumulative[idx] - before;
@@ -160,7 +160,7 @@ impl<const D: usize> Faces<D> {
 
 impl<const D: usize> Place<D> {
     /// The place of a particle: `share` from 0 to 1 of the mass comes before it, `uniforms` are its own.
-    pub fn at(&self, share: f64, uniforms: &[f64; 8], count: u64) -> [f64; D] {
+    pub fn at(&self, share: f64, uniforms: &[f64; 8]) -> [f64; D] {
         let between = |low: &[f64; D], high: &[f64; D]| {
             std::array::from_fn(|axis| low[axis] + uniforms[axis] * (high[axis] - low[axis]))
         };
@@ -178,7 +178,7 @@ impl<const D: usize> Place<D> {
                 let (low, high) = &faces.corners[face];
                 between(low, high)
             }
-            Self::List(places) => places[count as usize % places.len()],
+            Self::Spots(spots) => spots.at(share),
         }
     }
 }
@@ -219,13 +219,13 @@ mod tests {
         assert!((cells.total() - 1.0).abs() < 1e-5);
         let place = Place::Cells(cells);
         for (share, x) in [(0.001, 1.001), (0.5, 1.5), (0.999, 1.999)] {
-            assert!((place.at(share, &[0.5; 8], 0)[0] - x).abs() < 1e-5);
+            assert!((place.at(share, &[0.5; 8])[0] - x).abs() < 1e-5);
         }
         let faces = Faces::new(vec![([0.0, 0.0], [0.0, 1.0], 1.0), ([0.0, 1.0], [0.0, 2.0], 3.0)]);
         let uniforms = |face: f64| [0.5, 0.5, 0.5, face, 0.5, 0.5, 0.5, 0.5];
         let place = Place::Faces(faces);
-        assert_eq!(place.at(0.0, &uniforms(0.2), 0), [0.0, 0.5]);
-        assert_eq!(place.at(0.0, &uniforms(0.3), 0), [0.0, 1.5]);
+        assert_eq!(place.at(0.0, &uniforms(0.2)), [0.0, 0.5]);
+        assert_eq!(place.at(0.0, &uniforms(0.3)), [0.0, 1.5]);
     }
 
     #[test]

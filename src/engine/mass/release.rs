@@ -76,7 +76,7 @@ impl<const D: usize> Release<D> {
                     let along = (count as f64 + uniforms[5]) / n as f64;
                     let t = from + along * (to - from);
                     if t >= window.t && t < end {
-                        let position = self.place.at(sampling.share(count, n, &uniforms), &uniforms, count);
+                        let position = self.place.at(sampling.share(count, n, &uniforms), &uniforms);
                         births.push(Birth {
                             id,
                             population: self.population,
@@ -102,7 +102,7 @@ impl<const D: usize> Release<D> {
                 for count in before as u64..after as u64 {
                     let id = flock::id(self.origin, count);
                     let uniforms = stream.uniforms_of(id, 0);
-                    let mut position = self.place.at(uniforms[5], &uniforms, count);
+                    let mut position = self.place.at(uniforms[5], &uniforms);
                     position[*axis] += sign * own.depth(uniforms[6]);
                     // They are where they are at the end of the step.
                     births.push(Birth { id, population: self.population, position, entered: 1.0 });
@@ -115,7 +115,7 @@ impl<const D: usize> Release<D> {
                 for k in 0..*n {
                     let id = flock::id(self.origin, window.step * n + k);
                     let uniforms = stream.uniforms_of(id, 0);
-                    let position = Place::Box(*low, *high).at(0.5, &uniforms, k);
+                    let position = Place::Box(*low, *high).at(0.5, &uniforms);
                     births.push(Birth { id, population: self.population, position, entered: 0.0 });
                 }
             }

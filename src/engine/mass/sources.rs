@@ -9,6 +9,7 @@ use super::entry::Entry;
 use super::parts::{Part, Shape};
 use super::place::{Place, Tail};
 use super::release::Sampling;
+use super::spots::Spots;
 use super::world::Site;
 use crate::plan::transport::{Region, SideRule, Source, Strength};
 
@@ -31,16 +32,15 @@ impl<const D: usize> Site<'_, D> {
             Region::Gaussian(centre, deviation) => {
                 Place::Gaussian(array(centre), array(deviation), std::array::from_fn(|axis| self.tail(axis)))
             }
-            Region::Table(columns) => {
-                let n = columns.first().map_or(0, Vec::len);
-                Place::List((0..n).map(|row| std::array::from_fn(|axis| columns[axis][row])).collect())
-            }
+            Region::Table(cloud) => Place::Spots(Spots::new(cloud)),
         };
         let (from, to) = (source.during.0, source.during.1.min(self.plan.time.duration));
-        let sampling = Sampling::Stratified;
         let (mass, shape) = match source.strength {
-            Strength::Pulse(mass) => (mass, Shape::Steady { from, to: from, sampling }),
-            Strength::Rate(rate) => (rate * (to - from).max(0.0), Shape::Steady { from, to, sampling }),
+            Strength::Pulse(mass) => (mass, Shape::Steady { from, to: from, sampling: Sampling::Stratified }),
+            // The order of particles is that of their times: places must not follow it.
+            Strength::Rate(rate) => {
+                (rate * (to - from).max(0.0), Shape::Steady { from, to, sampling: Sampling::Random })
+            }
             Strength::Held(c) => self.filled(tracker, population, c, &place, (from, to)),
         };
         Part { door, mass, place, shape }

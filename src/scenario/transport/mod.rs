@@ -3,6 +3,7 @@
 //! Owns the types, and in the files beside it the checks. May use the scenario's slots and expressions. It
 //! deliberately solves and samples nothing: `plan` and `flow` do.
 
+mod cloud;
 pub(super) mod darcy;
 pub(super) mod dispersion;
 pub(super) mod file;
@@ -19,7 +20,9 @@ pub use file::FileFlow;
 
 use super::choice::Covariance;
 use super::expression::Expr;
+use crate::data::Cloud;
 use crate::source::Span;
+use std::sync::Arc;
 
 /// How the water moves, in the resting frame.
 #[derive(Debug, Clone, PartialEq)]
@@ -133,13 +136,15 @@ pub struct Source {
 }
 
 /// Places along x, y, z.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Region {
     Point([f64; 3]),
     Line([f64; 3], [f64; 3]),
     Box([f64; 3], [f64; 3]),
     /// Centre and standard deviation.
     Gaussian([f64; 3], [f64; 3]),
+    /// Rows of a table: coordinates along the axes of the domain, and what each gives.
+    Table(Arc<Cloud>),
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]

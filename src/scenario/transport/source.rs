@@ -54,7 +54,7 @@ impl Checker<'_> {
 }
 
 /// What a value of a source can be, of a species with this concentration.
-fn dimensions(concentration: Dimension, n_axes: usize) -> [Dimension; 3] {
+pub(super) fn dimensions(concentration: Dimension, n_axes: usize) -> [Dimension; 3] {
     let space = Dimension::LENGTH.power(n_axes as i32, 1).unwrap_or(Dimension::NONE);
     let amount = concentration.times(space);
     [concentration, amount.over(Dimension::TIME), amount]
@@ -106,7 +106,8 @@ fn source<'a>(
     written: &'a tree::Source,
     duration: Option<f64>,
 ) -> Option<Vec<Source>> {
-    let region = region(checker, written);
+    let is_table = written.arguments.is_empty() && checker.table_of(&written.region.value).is_some();
+    let region = if is_table { None } else { region(checker, written) };
     let end = duration.unwrap_or(f64::INFINITY);
     let during = written.during.as_ref().map(|range| {
         let (from, to, _) = checker.range(range, "the time of a source", Some(Dimension::TIME))?;
@@ -118,6 +119,7 @@ fn source<'a>(
     });
     let mut list = Vec::new();
     let mut is_right = true;
+    let table = written.arguments.is_empty().then(|| checker.table_of(&written.region.value)).flatten();
     for (place, assignment) in written.carried.iter().enumerate() {
         if let Some(first) = written.carried[..place].iter().find(|it| it.name.value == assignment.name.value)
         {
@@ -131,19 +133,22 @@ fn source<'a>(
             is_right = false;
             continue;
         }
-        match strength(checker, assignment) {
+        let found = match (table, &region) {
+            (Some(table), _) => super::cloud::rows(checker, table, written, assignment),
+            (None, region) => strength(checker, assignment).zip(region.clone()),
+        };
+        match found {
             Some(found) => list.push((found, assignment)),
             None => is_right = false,
         }
     }
-    let region = region?;
     let during = match during {
         Some(during) => Some(during?),
         None => None,
     };
     let mut sources = Vec::new();
-    for ((species, strength), assignment) in list {
-        is_right &= check_strength(checker, strength, region, during, written, assignment).is_some();
+    for (((species, strength), region), assignment) in list {
+        is_right &= check_strength(checker, strength, &region, during, written, assignment).is_some();
         let window = match strength {
             Strength::Pulse(_) => None,
             _ => during.map(|(from, to)| (from.value, to.value)).or(Some((0.0, duration?))),
@@ -179,7 +184,7 @@ fn strength<'a>(checker: &mut Checker<'a>, written: &'a tree::Assignment) -> Opt
     Some((species, strength))
 }
 
-fn report_dimension(
+pub(super) fn report_dimension(
     checker: &mut Checker<'_>,
     written: &tree::Assignment,
     found: Type,
@@ -213,7 +218,7 @@ fn report_dimension(
 fn check_strength(
     checker: &mut Checker<'_>,
     strength: Strength,
-    region: Region,
+    region: &Region,
     during: Option<(Value, Value)>,
     written: &tree::Source,
     assignment: &tree::Assignment,
