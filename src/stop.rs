@@ -35,7 +35,7 @@ pub fn code(error: &RunError) -> Code {
         RunError::Chemistry { .. } => R107,
         RunError::TooManySubSteps { .. } => R106,
         RunError::OutOfMemory { .. } | RunError::Threads(_) => R103,
-        RunError::Flow(_) => R108,
+        RunError::Flow(_) | RunError::Leak { .. } => R108,
         RunError::Plan(_) => R104,
         RunError::Sink(_) => F103,
     }
@@ -82,6 +82,9 @@ pub fn message(error: &RunError, scenario: &Scenario, plan: &Plan) -> Diagnostic
         RunError::Flow(_) => message.at(place.motion(), "this flow").help(
             "bound a `conductivity` that varies by many decades with `max` and `min`; give a random one shorter correlation lengths, or fewer cells in `grid`",
         ),
+        RunError::Leak { side, .. } => message.at(place.side(*side), "nothing says what this water carries").help(
+            "parcels of water go with it: let the side be `inflow` (alone for clean water), `concentration`, or `outflow` where it only goes out",
+        ),
         RunError::Cancelled => message.note("no table was written; the same scene gives the same bytes again"),
         RunError::Plan(_) | RunError::Threads(_) | RunError::Sink(_) => message,
     }
@@ -96,6 +99,11 @@ struct Place<'a> {
 impl Place<'_> {
     fn named(&self, name: &str) -> Option<&Species> {
         self.scenario.species.iter().find(|species| species.name == name)
+    }
+
+    fn side(&self, side: usize) -> Span {
+        let axis = self.scenario.domain.axes.get(side / 2);
+        axis.map_or(self.scenario.domain.span, |axis| [axis.low_side_span, axis.high_side_span][side % 2])
     }
 
     fn species(&self, name: &str) -> Span {

@@ -133,7 +133,7 @@ codes! {
     M029 "a flow that makes or loses water",
     M030 "a Darcy flow without a solution",
     M031 "a source that cannot be",
-    M032 "an output that needs particles with mass",
+    M032 "an output that these particles do not have",
     M033 "a flow cannot be read from its files",
     T101 "a table of numbers cannot be read",
     T102 "the rows of a table make no function",

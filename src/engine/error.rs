@@ -62,6 +62,17 @@ pub enum RunError {
     },
     /// The flow could not be solved for.
     Flow(String),
+    /// Water goes through a side that says nothing of what it carries.
+    Leak {
+        /// Twice the active axis, plus one at its upper end, and its word.
+        side: usize,
+        name: &'static str,
+        /// What the water does, and what the side does.
+        way: &'static str,
+        kind: &'static str,
+        /// m³/s, or per what is missing of three axes.
+        rate: f64,
+    },
     /// A particle would need more sub-steps than a step may have.
     TooManySubSteps {
         step: u64,
@@ -129,6 +140,13 @@ impl fmt::Display for RunError {
                 write!(f, "`{kind} {quantity}` at {t} s is larger than numbers can hold (1.8e308 in SI)")
             }
             Self::Flow(what) => write!(f, "the flow: {what}"),
+            Self::Leak { name, way, kind, rate, .. } => {
+                let rate = precise(*rate);
+                write!(
+                    f,
+                    "water {way} through side `{name}`, which {kind} ({rate} m³/s, per m of missing axes)"
+                )
+            }
             Self::TooManySubSteps { step, particle } => {
                 write!(f, "step {step}: particle {particle} would need more than 16,384 sub-steps")
             }

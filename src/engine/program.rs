@@ -326,7 +326,8 @@ fn check_indices(plan: &Plan, n_axes: usize) -> Result<(), RunError> {
                 Quantity::Pair(a, b) => !is_immobile(a) && !is_immobile(b),
                 Quantity::Species(_) => false,
             });
-        let has_fluid = !output.kind.needs_masses();
+        let is_counted = plan.transport.is_some() || !output.kind.counts_passages();
+        let has_fluid = is_counted && !output.kind.needs_masses();
         if !has_fluid || !is_quantity_sound || !is_binned || !is_mixing_sound {
             return Err(unsound("an output whose species or bins do not fit"));
         }

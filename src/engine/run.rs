@@ -9,6 +9,7 @@ use super::clock::Clock;
 use super::conserved;
 use super::control::{Control, Settings};
 use super::error::RunError;
+use super::mass::gate::Gates;
 use super::observe::{self, Instant, Lab};
 use super::parallel::{self, Pool};
 use super::program::{Program, Work};
@@ -18,8 +19,9 @@ use super::schedule::{Due, schedule, step_length};
 use super::snapshot::{Outcome, Snapshot};
 use super::step::{OnBlock, Pass, Scratch, Trouble};
 use super::track::tracker::Steps;
-use super::water::Water;
+use super::water::{Water, quanta};
 use super::{initial, walk::Leap};
+use crate::maths::exact::Quanta;
 use crate::maths::wide::Width;
 use crate::plan::Plan;
 use crate::state::particles::{Block, state_bytes};
@@ -50,7 +52,7 @@ pub struct Run<'a, const D: usize> {
     scratches: Pool<Scratch<D>>,
     groups: Vec<Group>,
     blocks_per_group: usize,
-    before: Vec<Amount>,
+    pub before: Vec<Amount>,
     /// What reactions conserve.
     invariants: Vec<Vec<f64>>,
     /// Smallest value allowed per component.
@@ -58,6 +60,9 @@ pub struct Run<'a, const D: usize> {
     pub reactions: Reactions,
     /// What moves particles that come and go; the walk of the program moves all others.
     pub water: Option<Water<D>>,
+    /// Outputs of what passes places.
+    pub gates: Gates,
+    pub quanta: Quanta,
 }
 
 /// Sums and the first trouble of consecutive blocks.
@@ -75,24 +80,28 @@ pub fn run<const D: usize>(
     sink: Sink,
 ) -> Result<Outcome, RunError> {
     let mut clock = Clock::start();
-    let dues = schedule(plan)?;
-    let mut run = Run::<D>::new(plan, settings)?;
+    let mut dues = schedule(plan)?;
+    let mut run = Run::<D>::new(plan, settings, &mut dues)?;
     let mut loop_clock = Clock::start();
     let mut dues = dues.iter().peekable();
-    let mut hand_out =
-        |run: &Run<D>, due: &Due, instant: Instant<D>, clock: &mut Clock, loop_clock: &mut Clock| {
-            for snapshot in observe::observe(run, due, &instant)? {
-                loop_clock.away(|| clock.away(|| sink(snapshot)))?;
-            }
-            Ok::<(), RunError>(())
-        };
     for step in 0..=plan.time.n_steps {
+        let mut passed = Vec::new();
+        in_order(&mut passed, run.gates.ready(step));
         while let Some(due) = dues.next_if(|due| due.steps == step) {
             run.look_at(due.t, step)?;
-            match run.ahead(due)? {
-                Some(ahead) => hand_out(&ahead, due, Instant::Now, &mut clock, &mut loop_clock)?,
-                None => hand_out(&run, due, run.instant(due), &mut clock, &mut loop_clock)?,
+            let mut snapshots = match run.ahead(due)? {
+                Some(ahead) => observe::observe(&ahead, due, &Instant::Now)?,
+                None => observe::observe(&run, due, &run.instant(due))?,
+            };
+            let (before, later) = passed.into_iter().partition(|snapshot| snapshot.t <= due.t);
+            passed = later;
+            in_order(&mut snapshots, before);
+            for snapshot in snapshots {
+                loop_clock.away(|| clock.away(|| sink(snapshot)))?;
             }
+        }
+        for snapshot in passed {
+            loop_clock.away(|| clock.away(|| sink(snapshot)))?;
         }
         if control.is_cancelled() {
             return Err(RunError::Cancelled);
@@ -118,17 +127,24 @@ pub fn run<const D: usize>(
 }
 
 impl<'a, const D: usize> Run<'a, D> {
-    fn new(plan: &'a Plan, settings: &Settings) -> Result<Self, RunError> {
+    /// Outputs of what passes places leave `dues`.
+    fn new(plan: &'a Plan, settings: &Settings, dues: &mut Vec<Due>) -> Result<Self, RunError> {
         let mut program = Program::<D>::new(plan)?;
         program.mover.takes_half_draws = settings.takes_half_draws;
         let width = if settings.is_narrow { Width::baseline() } else { Width::widest() };
-        let water = match plan.transport {
-            Some(_) => Some(Water::new(&mut program, settings, width)?),
-            None => None,
+        let (water, gates) = match plan.transport {
+            Some(_) => {
+                let (water, gates) = Water::new(&mut program, settings, width, dues)?;
+                (Some(water), gates)
+            }
+            None => (None, Gates::default()),
         };
         let mut blocks = initial::blocks(&program, water.as_ref().and_then(Water::cells))?;
         let before = amount::amounts(&blocks, program.n_columns());
         let reactions = Reactions::new(&program, &mut blocks)?;
+        let ranges = water.iter().flat_map(|water| &water.ranges).map(|range| range.1);
+        let highest = before.iter().map(|amount| amount.highest).chain(ranges).fold(0.0, f64::max);
+        let quanta = quanta(program.volume, highest);
         let limits = limits(&program, &before, water.as_ref().map_or(&[], |water| &water.ranges));
         let blocks_per_group = average::blocks_per_group(plan.particles.count, program.grid.n_slots());
         let n_groups = blocks.len().div_ceil(blocks_per_group);
@@ -151,6 +167,8 @@ impl<'a, const D: usize> Run<'a, D> {
             limits,
             reactions,
             water,
+            gates,
+            quanta,
         })
     }
 
@@ -174,6 +192,8 @@ impl<'a, const D: usize> Run<'a, D> {
             limits: self.limits.clone(),
             reactions: self.reactions.copy(),
             water: self.water.as_ref().map(Water::copy),
+            gates: Gates::default(),
+            quanta: self.quanta,
         }
     }
 
@@ -218,8 +238,10 @@ impl<'a, const D: usize> Run<'a, D> {
 
     /// A step of particles that come and go: a stage of its own.
     pub(super) fn flow_on(&mut self, steps: Steps) -> Result<(), RunError> {
+        self.prepare_gates(steps.first)?;
         let Some(water) = &mut self.water else { return Ok(()) };
-        water.flow_on(&mut self.blocks, steps)?;
+        let passages = water.flow_on(&mut self.blocks, steps)?;
+        self.count(&passages, steps.first)?;
         self.groups.resize_with(self.blocks.len().div_ceil(self.blocks_per_group), Group::default);
         self.is_averaged = false;
         Ok(())
@@ -426,6 +448,12 @@ impl<'a, const D: usize> Run<'a, D> {
             amount::amounts(&self.blocks, self.program.n_columns()).iter().map(|amount| amount.sum).collect();
         Ok(self.defects(&after))
     }
+}
+
+/// Adds snapshots of what passed: in the order of times, those of one time in the order of outputs.
+fn in_order(snapshots: &mut Vec<Snapshot>, passed: Vec<Snapshot>) {
+    snapshots.extend(passed);
+    snapshots.sort_by(|a, b| a.t.total_cmp(&b.t).then(a.output_idx.cmp(&b.output_idx)));
 }
 
 /// Smallest value allowed per component: none where the initial values are negative somewhere.

@@ -41,7 +41,7 @@ const PARTICLE: u64 = 2 * BLOCK as u64 + 1234;
 
 /// Four good steps, the spoiling, and what the fifth says. The fields are `A` and `B`, two columns each.
 fn fifth_step(plan: &Plan, spoil: fn(&mut Block<1>, usize)) -> Result<(), RunError> {
-    let mut run = Run::<1>::new(plan, &Settings::default())?;
+    let mut run = Run::<1>::new(plan, &Settings::default(), &mut Vec::new())?;
     assert_eq!((run.program.n_components(), run.program.n_columns()), (2, 4));
     for step in 0..4 {
         run.step(step)?;
@@ -126,7 +126,7 @@ fn lost_mass_names_step_and_species() {
 #[test]
 fn the_defect_at_the_end_is_told() {
     let plan = compiled().plan;
-    let mut run = Run::<1>::new(&plan, &Settings::default()).unwrap();
+    let mut run = Run::<1>::new(&plan, &Settings::default(), &mut Vec::new()).unwrap();
     (0..4).for_each(|step| run.step(step).unwrap());
     let defects = run.finish().unwrap();
     assert!(defects.iter().all(|&defect| defect < 1e-13), "{defects:?}");
@@ -140,7 +140,7 @@ fn the_defect_at_the_end_is_told() {
 fn an_amount_beyond_the_range_of_numbers_names_the_species() {
     let mut plan = compiled().plan;
     plan.components[1].initial = Tape { operations: vec![Operation::Constant(1e306)] };
-    let mut run = Run::<1>::new(&plan, &Settings::default()).unwrap();
+    let mut run = Run::<1>::new(&plan, &Settings::default(), &mut Vec::new()).unwrap();
     let error = run.step(0).unwrap_err();
     assert_eq!(error.to_string(), "step 1: the amount of `B` is not a finite number");
 }
@@ -155,8 +155,14 @@ fn durations_that_are_multiples_up_to_rounding_can_run() {
         plan.outputs.clear();
         plan.time = Time::new(duration, step);
         assert_eq!(plan.time.n_steps as f64, (duration / step).round());
-        assert!(Run::<1>::new(&plan, &Settings::default()).is_ok(), "{duration} s in steps of {step} s");
+        assert!(
+            Run::<1>::new(&plan, &Settings::default(), &mut Vec::new()).is_ok(),
+            "{duration} s in steps of {step} s"
+        );
         plan.time.n_steps -= 1;
-        assert!(Run::<1>::new(&plan, &Settings::default()).is_err(), "a step is missing of {duration} s");
+        assert!(
+            Run::<1>::new(&plan, &Settings::default(), &mut Vec::new()).is_err(),
+            "a step is missing of {duration} s"
+        );
     }
 }

@@ -93,7 +93,8 @@ impl Plan {
         let is_right = has_station
             && output.station.as_ref().is_none_or(|station| station::fits(station, self.axes.len()));
         require(is_right, || format!("an output `{}` is taken at no place", output.kind.word()))?;
-        let is_right = self.carries_mass() || !output.kind.needs_masses();
+        let is_counted = self.transport.is_some() || !output.kind.counts_passages();
+        let is_right = is_counted && (self.carries_mass() || !output.kind.needs_masses());
         require(is_right, || format!("an output `{}` needs particles with mass", output.kind.word()))?;
         let n_bins = if wants_bins { self.axes.len() } else { 0 };
         let is_right = output.bins.len() == n_bins && output.bins.iter().all(|bins| *bins >= 1);

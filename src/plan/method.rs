@@ -12,6 +12,8 @@ pub(super) fn choose(plan: &mut Plan) {
     let species_of = species_of_components(plan);
     let immobile: Vec<bool> = plan.components.iter().map(|component| component.is_immobile).collect();
     let changes_water = plan.transport.as_ref().is_some_and(super::transport::Transport::changes_water);
+    // What has left is not there when somebody looks.
+    let changes_water = changes_water || plan.outputs.iter().any(|output| output.kind.counts_passages());
     let Some(chemistry) = &mut plan.chemistry else { return };
     let is_closed = chemistry.equilibrium.is_none();
     let integrator = chemistry.integrator;

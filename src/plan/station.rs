@@ -123,6 +123,8 @@ impl OutputKind {
     }
 }
 
+/// The row of a budget of fluid that says what reactions made.
+pub const REACTIONS: &str = "reactions";
 /// The row of a budget that says what is there.
 pub const INSIDE: &str = "inside";
 /// The row of a budget that says what is missing.
@@ -138,6 +140,11 @@ impl Plan {
         let wells = self.transport.iter().flat_map(|transport| transport.outlets());
         doors.extend(wells.map(|outlet| outlet.name));
         doors
+    }
+
+    /// Whether parcels of water react on their way.
+    pub fn has_fluid_reactions(&self) -> bool {
+        !self.carries_mass() && self.reacts_in_steps()
     }
 
     /// The word of a side: twice the active axis, plus one at its upper end.
@@ -159,6 +166,9 @@ impl Plan {
                 let mut places = self.doors();
                 let decay = self.transport.iter().flat_map(|transport| &transport.decay);
                 places.extend(decay.flat_map(|decay| &decay.reactions).map(|turn| turn.name.clone()));
+                if self.has_fluid_reactions() {
+                    places.push(REACTIONS.to_owned());
+                }
                 places.extend([INSIDE.to_owned(), DEFECT.to_owned()]);
                 places
             }

@@ -210,9 +210,14 @@ impl OutputKind {
         matches!(self, OutputKind::Breakthrough | OutputKind::FirstPassage)
     }
 
-    /// Whether only particles that carry mass have it: what they do on their way is counted.
-    pub fn needs_masses(self) -> bool {
+    /// Whether what particles do on their way is counted.
+    pub fn counts_passages(self) -> bool {
         matches!(self, OutputKind::Breakthrough | OutputKind::FirstPassage | OutputKind::Budget)
+    }
+
+    /// Whether only particles that carry mass have it: parcels of water pass again and again with other contents.
+    pub fn needs_masses(self) -> bool {
+        self == OutputKind::FirstPassage
     }
 }
 

@@ -139,10 +139,13 @@ fn is_gate(output: &Output) -> bool {
     matches!(output.station, Some(Station::Plane { .. } | Station::Side(_)))
 }
 
-/// The populations of an output's species, in its order; nothing is carried by some.
+/// The populations of an output's species, in its order; nothing is carried by some. Parcels of water carry them all.
 pub fn populations(plan: &Plan, output: &Output) -> Vec<Option<usize>> {
     let of = |quantity: &Quantity| {
         let (Quantity::Species(species) | Quantity::Pair(species, _)) = *quantity;
+        if !plan.carries_mass() {
+            return Some(species);
+        }
         let mut populations = plan.transport.iter().flat_map(|transport| &transport.populations);
         populations.position(|population| population.species == species)
     };

@@ -4,10 +4,10 @@
 //! deliberately knows no files.
 
 mod births;
-mod book;
+pub(super) mod book;
 mod entry;
 pub(super) mod flock;
-mod gate;
+pub(super) mod gate;
 mod initial;
 mod inlets;
 mod march;

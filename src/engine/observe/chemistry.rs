@@ -35,6 +35,12 @@ impl Needs {
             match output.kind {
                 OutputKind::Particles => reacted.fill(true),
                 OutputKind::Mixing => {}
+                OutputKind::Budget => {
+                    for quantity in &output.quantities {
+                        let (Quantity::Species(idx) | Quantity::Pair(idx, _)) = *quantity;
+                        unreacted[idx] = true;
+                    }
+                }
                 _ => {
                     for quantity in &output.quantities {
                         match *quantity {

@@ -3,6 +3,7 @@
 //! Owns the passes of an observation. May use the stages and `state`. It deliberately disturbs
 //! nothing: a run with one output more gives the same bytes for all others.
 
+mod budget;
 mod chemistry;
 mod lab;
 mod look;
@@ -54,7 +55,7 @@ pub fn observe<const D: usize>(
             Some((grid, means)) => Mixing::new(program, output, means, Some(grid)),
             None => Mixing::new(program, output, &means, None),
         });
-        tallies.push(Tally::new(program, output, mixing, &run.reactions.immobile).ok_or_else(bad_bins)?);
+        tallies.push(Tally::new(run, output, mixing).ok_or_else(bad_bins)?);
     }
     let needs = Needs::of(program, &due.outputs);
     let values = sum(run, instant, &means, &needs, &tallies);
@@ -248,6 +249,40 @@ fn particles<const D: usize>(run: &Run<D>, instant: &Instant<D>, means: &Means, 
     Values::Particles {
         positions: (0..D).map(column).collect(),
         concentrations: (D..D + n_species).map(column).collect(),
+    }
+}
+
+/// Concentrations of the species in parcels that are on their way, as some outputs need them: with the means of the
+/// bins that they were in.
+pub fn concentrations<const D: usize>(
+    run: &Run<D>,
+    block: &Block<D>,
+    outputs: &[usize],
+    step: u64,
+) -> Result<Vec<Vec<f64>>, RunError> {
+    let needs = Needs::of(&run.program, outputs);
+    let mut values = vec![Vec::with_capacity(block.n_particles); run.program.plan.species.len()];
+    run.labs.lend(
+        || Lab::new(&run.program),
+        |lab| {
+            let instant = Instant::Now;
+            for range in block.portions(instant.portion()) {
+                let resolved = Some((&run.means, &needs));
+                let (sums, target) = (Sums::None, &mut [][..]);
+                run.width.run(Look { run, instant: &instant, resolved, block, range, lab, sums, target });
+                values
+                    .iter_mut()
+                    .zip(&lab.species)
+                    .for_each(|(column, source)| column.extend(&source[..lab.n]));
+            }
+        },
+    );
+    match run.reactions.speciation.as_ref().and_then(Speciation::failure) {
+        None => Ok(values),
+        Some((particle, why)) => {
+            let what = run.reactions.explain(&run.program, why);
+            Err(RunError::Chemistry { step: step + 1, particle, what, why })
+        }
     }
 }
 

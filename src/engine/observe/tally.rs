@@ -6,11 +6,13 @@
 #![allow(clippy::needless_range_loop)] // Zipped iterators are not always inlined; these loops are hot.
 
 use super::super::program::{Program, Term};
+use super::super::run::Run;
 use super::super::snapshot::Values;
+use super::budget::{self, Budget};
 use super::lab::Lab;
 use super::mixing::Mixing;
 use super::spread;
-use crate::plan::{Output, OutputKind, Quantity};
+use crate::plan::{Output, OutputKind, Quantity, Station};
 use crate::state::grid::Grid;
 use crate::state::particles::CHUNK;
 
@@ -38,6 +40,13 @@ pub enum Tally<'a, const D: usize> {
     Moments {
         species: Vec<usize>,
     },
+    /// Means in a box.
+    Within {
+        low: [f64; D],
+        high: [f64; D],
+        species: Vec<usize>,
+    },
+    Budget(Budget),
     Dilution {
         bins: Bins<D>,
         species: Vec<usize>,
@@ -92,12 +101,10 @@ impl Follow {
 
 impl<'a, const D: usize> Tally<'a, D> {
     /// `None` if the output's bins do not make a grid.
-    pub fn new(
-        program: &Program<D>,
-        output: &Output,
-        mixing: Option<Mixing<'a, D>>,
-        immobile: &[Vec<f64>],
-    ) -> Option<Self> {
+    pub fn new(run: &Run<D>, output: &Output, mixing: Option<Mixing<'a, D>>) -> Option<Self> {
+        let (program, immobile) = (&run.program, &run.reactions.immobile);
+        let in_bins =
+            |species: &[usize]| species.iter().map(|&idx| amount_in_bins(program, idx, immobile)).collect();
         Some(match output.kind {
             OutputKind::Profile | OutputKind::Map => {
                 let follow = Follow::new(program);
@@ -108,8 +115,7 @@ impl<'a, const D: usize> Tally<'a, D> {
             }
             OutputKind::Total => {
                 let species = species(output);
-                let in_bins = species.iter().map(|&idx| amount_in_bins(program, idx, immobile)).collect();
-                Self::Total { species, in_bins }
+                Self::Total { in_bins: in_bins(&species), species }
             }
             OutputKind::Mixing => Self::Mixing(mixing?),
             OutputKind::Particles => Self::Particles,
@@ -117,8 +123,24 @@ impl<'a, const D: usize> Tally<'a, D> {
             OutputKind::Dilution => {
                 Self::Dilution { bins: Bins::new(program, output)?, species: species(output) }
             }
-            // Only particles that carry mass have these: a plan that asks for them is not run here.
-            OutputKind::Breakthrough | OutputKind::FirstPassage | OutputKind::Budget => return None,
+            OutputKind::Budget => {
+                let species = species(output);
+                Self::Budget(Budget {
+                    accounts: species.iter().map(|&idx| run.account(idx)).collect(),
+                    in_bins: in_bins(&species),
+                    species,
+                })
+            }
+            OutputKind::Breakthrough => {
+                let Some(Station::Box { low, high }) = &output.station else { return None };
+                Self::Within {
+                    low: <[f64; D]>::try_from(&low[..]).ok()?,
+                    high: <[f64; D]>::try_from(&high[..]).ok()?,
+                    species: species(output),
+                }
+            }
+            // Only particles that carry mass have it: a plan that asks for it is not run here.
+            OutputKind::FirstPassage => return None,
         })
     }
 
@@ -129,7 +151,11 @@ impl<'a, const D: usize> Tally<'a, D> {
                 bins.grid.n_slots()
             }
             Self::Mixing(mixing) => mixing.n_slots(),
-            Self::Total { .. } | Self::Moments { .. } | Self::Particles => 1,
+            Self::Total { .. }
+            | Self::Moments { .. }
+            | Self::Within { .. }
+            | Self::Budget(_)
+            | Self::Particles => 1,
         }
     }
 
@@ -143,6 +169,8 @@ impl<'a, const D: usize> Tally<'a, D> {
             Self::Total { species, .. } => species.len(),
             Self::Mixing(mixing) => mixing.n_sums(),
             Self::Moments { species } => species.len() * (1 + D),
+            Self::Within { species, .. } => 1 + species.len(),
+            Self::Budget(budget) => budget.species.len(),
             Self::Dilution { bins, species } => bins.grid.n_slots() * (1 + species.len()),
             Self::Particles => 0,
         }
@@ -154,7 +182,7 @@ impl<'a, const D: usize> Tally<'a, D> {
             Self::Binned { bins, species, .. } => bins.grid.n_slots() * species.len(),
             Self::Covariance { bins, pairs } => bins.grid.n_slots() * pairs.len(),
             Self::Moments { species } => species.len() * spread::N_PRODUCTS,
-            Self::Total { .. } | Self::Mixing(_) | Self::Dilution { .. } | Self::Particles => 0,
+            _ => 0,
         }
     }
 
@@ -178,6 +206,8 @@ impl<'a, const D: usize> Tally<'a, D> {
             }
             Self::Mixing(mixing) => mixing.add(lab, sums),
             Self::Moments { species } => spread::add_first(lab, species, sums),
+            Self::Within { low, high, species } => budget::add_within(lab, low, high, species, sums),
+            Self::Budget(budget) => budget.add(lab, sums),
             Self::Dilution { bins, species } => {
                 let own = species.iter().map(|&idx| &lab.species[idx]);
                 add_binned(bins, lab, &own.collect::<Vec<_>>(), sums);
@@ -195,7 +225,7 @@ impl<'a, const D: usize> Tally<'a, D> {
             }
             Self::Covariance { bins, pairs } => add_products(bins, lab, pairs, first, sums),
             Self::Moments { species } => spread::add_second(lab, species, first, sums),
-            Self::Total { .. } | Self::Mixing(_) | Self::Dilution { .. } | Self::Particles => {}
+            _ => {}
         }
     }
 
@@ -216,6 +246,8 @@ impl<'a, const D: usize> Tally<'a, D> {
             }
             Self::Mixing(mixing) => Some(Values::Mixing(mixing.states(first))),
             Self::Moments { species } => Some(spread::moments(program, species.len(), first, second)),
+            Self::Within { .. } => Some(budget::within(first)),
+            Self::Budget(budget) => Some(budget.rows(program, first)),
             Self::Dilution { bins, species } => {
                 Some(spread::dilutions(program, bins.grid.n_bins(), species.len(), first))
             }

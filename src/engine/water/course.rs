@@ -4,19 +4,24 @@
 //! the books. It deliberately lets nothing in.
 
 use super::super::error::RunError;
+use super::super::mass::book::What;
+use super::super::mass::gate::Gates;
 use super::super::mass::media::InMedium;
 use super::super::mass::world::Site;
 use super::super::parallel::Pool;
+use super::super::schedule::Due;
 use super::super::track::lanes::{LANES, Lane};
 use super::super::track::medium::{Carrier, Medium};
 use super::super::track::monitors::Crossing;
 use super::super::track::tracker::{Bench, Events, Steps, Tracker};
-use super::super::track::walls::{Exit, Touch};
+use super::super::track::walls::{Ends, Exit, Touch};
 use super::book::Moved;
 use super::composition::{Composition, Rinse};
 use super::inlets::{self, Inlet};
+use super::passages::{Cargo, Passages, Passed, Watched};
 use super::{Passage, Trouble};
 use crate::maths::wide::Width;
+use crate::plan::Station;
 use crate::plan::transport::Patch;
 use crate::state::particles::Block;
 use std::sync::Arc;
@@ -25,7 +30,14 @@ use std::sync::Arc;
 pub trait Current<const D: usize>: Send + Sync {
     /// Takes a block through a step, and those out of it that leave. `entered` is the part of the step that is over
     /// when each comes in; nothing for parcels that have been there.
-    fn carry(&self, steps: Steps, entered: &[f64], block: &mut Block<D>, passage: &mut Passage);
+    fn carry(
+        &self,
+        steps: Steps,
+        entered: &[f64],
+        watched: &Watched,
+        block: &mut Block<D>,
+        passage: &mut Passage<D>,
+    );
 }
 
 /// A tracker in a medium, with what sides do to parcels.
@@ -43,10 +55,12 @@ pub struct Launched<const D: usize> {
     pub inlets: Vec<Inlet<D>>,
     /// Per component the lowest and highest value that sides give.
     pub ranges: Vec<(f64, f64)>,
+    pub gates: Gates,
+    pub watched: Watched,
 }
 
 /// Makes the current of a site, and what comes in with it.
-pub struct Launch {
+pub struct Launch<'a> {
     pub width: Width,
     /// Of a parcel.
     pub volume: f64,
@@ -54,13 +68,27 @@ pub struct Launch {
     pub n_slots: usize,
     /// Components that are carried.
     pub n: usize,
+    /// Outputs of what passes leave them.
+    pub dues: &'a mut Vec<Due>,
 }
 
-impl<const D: usize> InMedium<D> for Launch {
+impl<const D: usize> InMedium<D> for Launch<'_> {
     type Output = Launched<D>;
 
     fn go<M: Medium<D> + Send + 'static>(self, site: &Site<D>, medium: M) -> Result<Self::Output, RunError> {
-        let tracker = site.tracker(medium, self.width)?;
+        let mut tracker = site.tracker(medium, self.width)?;
+        let mut planes = Vec::new();
+        let period = |axis: usize| match tracker.ends[axis] {
+            Ends::Periodic { low, high } => Some(high - low),
+            Ends::Walls(_) => None,
+        };
+        let water = |station: &Station| site.water(&tracker.medium, station);
+        let gates = Gates::new(site.plan, self.dues, &mut planes, period, water);
+        tracker.planes = planes;
+        let is_watched = |side: &usize| {
+            site.plan.outputs.iter().any(|output| output.station == Some(Station::Side(*side)))
+        };
+        let watched = Watched { sides: (0..2 * D).map(|side| is_watched(&side)).collect() };
         let inlets = inlets::inlets(site, &tracker, self.volume, self.n)?;
         let axes: Vec<usize> = site.plan.axes.iter().map(|axis| axis.index).collect();
         let sides = site.transport.sides.iter().flatten();
@@ -70,7 +98,7 @@ impl<const D: usize> InMedium<D> for Launch {
         let rinses = sides.map(of_side).collect();
         let course = Course { tracker, rinses, n_slots: self.n_slots, benches: Pool::new() };
         let ranges = (0..self.n).map(|component| range(site, &axes, self.n, component)).collect();
-        Ok(Launched { current: Arc::new(course), inlets, ranges })
+        Ok(Launched { current: Arc::new(course), inlets, ranges, gates, watched })
     }
 }
 
@@ -85,11 +113,19 @@ fn range<const D: usize>(site: &Site<D>, axes: &[usize], n: usize, component: us
 }
 
 impl<const D: usize, M: Medium<D> + Send + 'static> Current<D> for Course<D, M> {
-    fn carry(&self, steps: Steps, entered: &[f64], block: &mut Block<D>, passage: &mut Passage) {
+    fn carry(
+        &self,
+        steps: Steps,
+        entered: &[f64],
+        watched: &Watched,
+        block: &mut Block<D>,
+        passage: &mut Passage<D>,
+    ) {
         self.benches.lend(
             || Box::new(self.tracker.bench()),
             |bench| {
-                self.tracker.width.run(OnBlock { course: self, steps, entered, block, bench, passage });
+                let course = self;
+                self.tracker.width.run(OnBlock { course, steps, entered, watched, block, bench, passage });
             },
         );
     }
@@ -100,9 +136,10 @@ struct OnBlock<'a, const D: usize, M: Medium<D>> {
     course: &'a Course<D, M>,
     steps: Steps,
     entered: &'a [f64],
+    watched: &'a Watched,
     block: &'a mut Block<D>,
     bench: &'a mut Bench<D, M>,
-    passage: &'a mut Passage,
+    passage: &'a mut Passage<D>,
 }
 
 impl<const D: usize, M: Medium<D>> pulp::NullaryFnOnce for OnBlock<'_, D, M> {
@@ -111,7 +148,7 @@ impl<const D: usize, M: Medium<D>> pulp::NullaryFnOnce for OnBlock<'_, D, M> {
     /// Takes 64 parcels at a time; those that stay close up.
     #[inline(always)]
     fn call(self) {
-        let Self { course, steps, entered, block, bench, passage } = self;
+        let Self { course, steps, entered, watched, block, bench, passage } = self;
         let n = block.n_particles;
         let mut kept = 0;
         bench.displacements = 0;
@@ -125,9 +162,13 @@ impl<const D: usize, M: Medium<D>> pulp::NullaryFnOnce for OnBlock<'_, D, M> {
                 rinses: &course.rinses,
                 n_slots: course.n_slots,
                 first,
-                n_axes: D,
+                middle: steps.t + 0.5 * steps.dt,
+                watched,
+                ids: &block.ids,
+                positions: &block.positions,
                 columns: &mut block.columns,
                 moved: &mut passage.moved,
+                passages: &mut passage.passages,
             };
             if let Err(problem) =
                 course.tracker.advance(&Carrier::WATER, steps, late.as_ref(), bench, &mut log)
@@ -166,14 +207,20 @@ fn lane_of(entered: &[f64]) -> Lane {
 }
 
 /// What happens to a group on its way.
-struct Log<'a> {
+struct Log<'a, const D: usize> {
     rinses: &'a [Vec<Rinse>],
     n_slots: usize,
     /// Place of the group in its block.
     first: usize,
-    n_axes: usize,
+    /// Middle of the step, s.
+    middle: f64,
+    watched: &'a Watched,
+    ids: &'a [u64],
+    /// At the beginning of the step.
+    positions: &'a [Vec<f64>; D],
     columns: &'a mut [Vec<f64>],
     moved: &'a mut Moved,
+    passages: &'a mut Passages<D>,
 }
 
 /// The door of a side, or of a well that is counted on behind the sides.
@@ -181,22 +228,49 @@ fn door(side: usize) -> usize {
     1 + side
 }
 
-impl Events for Log<'_> {
-    fn left(&mut self, _: u64, exit: Exit, _: f64) {
-        self.moved.leave(door(exit.side), self.columns, self.first + exit.lane);
+impl<const D: usize> Log<'_, D> {
+    fn passed(&self, idx: usize, what: What, cargo: Cargo, t: f64) -> Passed<D> {
+        let place = std::array::from_fn(|axis| self.positions[axis][idx]);
+        Passed { what, cargo, entered_by: None, id: self.ids[idx], t, place }
     }
 
-    fn crossed(&mut self, _: u64, _: usize, _: Crossing, _: f64) {}
+    /// A parcel passes with all it carries.
+    fn note(&mut self, idx: usize, what: What, t: f64) {
+        let passed = self.passed(idx, what, Cargo::Parcel, t);
+        let columns = &self.columns;
+        self.passages.push(passed, columns.len(), |column| columns[column][idx]);
+    }
+}
+
+impl<const D: usize> Events for Log<'_, D> {
+    fn left(&mut self, _: u64, exit: Exit, t: f64) {
+        let idx = self.first + exit.lane;
+        self.moved.leave(door(exit.side), self.columns, idx);
+        if self.watched.has(exit.side) {
+            self.note(idx, What::Left { side: exit.side, patch: exit.patch }, t);
+        }
+    }
+
+    fn crossed(&mut self, _: u64, plane: usize, crossing: Crossing, t: f64) {
+        let what = What::Crossed { plane, is_forward: crossing.is_forward };
+        self.note(self.first + crossing.lane, what, t);
+    }
 
     fn touched(&mut self, touch: &Touch) {
-        let rinse = &self.rinses[touch.side][touch.patch];
-        let place = &touch.place[..self.n_axes];
-        let idx = self.first + touch.lane;
-        for (column_idx, column) in self.columns.iter_mut().enumerate() {
+        let Touch { lane, side, patch, push, place } = *touch;
+        let rinse = &self.rinses[side][patch];
+        let idx = self.first + lane;
+        let n_slots = self.n_slots;
+        let loss = |(column_idx, column): (usize, &mut Vec<f64>)| {
             let before = column[idx];
-            let after = rinse.after(column_idx / self.n_slots, before, touch.push, place);
-            column[idx] = after;
-            self.moved.change(door(touch.side), column_idx, after - before);
+            column[idx] = rinse.after(column_idx / n_slots, before, push, &place[..D]);
+            before - column[idx]
+        };
+        let losses: Vec<f64> = self.columns.iter_mut().enumerate().map(loss).collect();
+        losses.iter().enumerate().for_each(|(column, loss)| self.moved.change(door(side), column, -loss));
+        if self.watched.has(side) && losses.iter().any(|loss| *loss != 0.0) {
+            let passed = self.passed(idx, What::Left { side, patch }, Cargo::Exchange, self.middle);
+            self.passages.push(passed, losses.len(), |column| losses[column]);
         }
     }
 }

@@ -9,7 +9,6 @@ use super::super::mass::world::Site;
 use super::super::track::medium::Medium;
 use super::super::track::tracker::Tracker;
 use super::composition::Composition;
-use crate::diagnostic::number;
 use crate::plan::transport::SideRule;
 
 /// Parts along an axis that a side is cut into where flow or porosity vary, with one and with two other axes.
@@ -140,22 +139,16 @@ fn check<const D: usize>(
     flux: &[Gush<D>],
     largest: f64,
 ) -> Result<(), RunError> {
-    let (what, leak): (&str, f64) = match rule {
-        SideRule::Reflect => ("reflects", flux.iter().map(|gush| gush.2.abs()).sum()),
-        SideRule::Partial(_) => ("absorbs at a rate", flux.iter().map(|gush| gush.2.abs()).sum()),
-        SideRule::Outflow => ("lets out", flux.iter().map(|gush| gush.2.max(0.0)).sum()),
+    let (way, kind, rate): (&str, &str, f64) = match rule {
+        SideRule::Reflect => ("goes", "reflects", flux.iter().map(|gush| gush.2.abs()).sum()),
+        SideRule::Partial(_) => ("goes", "absorbs at a rate", flux.iter().map(|gush| gush.2.abs()).sum()),
+        SideRule::Outflow => ("comes in", "lets out", flux.iter().map(|gush| gush.2.max(0.0)).sum()),
         _ => return Ok(()),
     };
     let others = (0..D).filter(|&axis| axis != side / 2);
     let area: f64 = others.map(|axis| site.high[axis] - site.low[axis]).product();
-    if leak <= LEAK * largest * area {
+    if rate <= LEAK * largest * area {
         return Ok(());
     }
-    let way = if matches!(rule, SideRule::Outflow) { "comes in" } else { "goes" };
-    Err(RunError::Flow(format!(
-        "water {way} through side `{}`, which {what} ({} m^3/s, or per m of missing axes): parcels of water go with \
-         it, so let the side be `inflow`, `outflow` or `concentration`",
-        site.plan.side_name(side),
-        number(leak),
-    )))
+    Err(RunError::Leak { side, name: site.plan.side_name(side), way, kind, rate })
 }

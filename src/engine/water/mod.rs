@@ -6,20 +6,26 @@
 mod book;
 mod composition;
 mod course;
+mod gates;
 mod inlets;
 mod parcels;
+mod passages;
 pub mod start;
 
 pub use book::Book;
+pub use gates::quanta;
 
 use super::error::RunError;
+use super::mass::book::What;
+use super::mass::gate::Gates;
 use super::mass::media::{flow_of, in_medium};
 use super::mass::place::Cells;
 use super::mass::release::{Birth, Window};
 use super::mass::world::Site;
 use super::parallel;
 use super::program::Program;
-use super::track::tracker::{Steps, TooManySubSteps};
+use super::schedule::Due;
+use super::track::tracker::{EARLIEST, Steps, TooManySubSteps};
 use super::{control::Settings, mass::flock};
 use crate::maths::wide::Width;
 use crate::state::particles::{BLOCK, Block};
@@ -27,6 +33,7 @@ use crate::state::stream::{Purpose, Stream};
 use book::Moved;
 use course::{Current, Launch, Launched};
 use inlets::Inlet;
+use passages::{Cargo, Passages, Passed, Watched};
 use std::sync::Arc;
 
 /// Particles that a run may have, over those that it begins with: the water in a domain stays the same.
@@ -47,16 +54,23 @@ pub struct Water<const D: usize> {
     n_slots: usize,
     has_memory: bool,
     most: u64,
+    watched: Watched,
     /// Displacements done, one per particle.
     pub displacements: u64,
 }
 
 /// What came of the parcels of a block in a step.
-#[derive(Default)]
-struct Passage {
+struct Passage<const D: usize> {
     moved: Moved,
+    passages: Passages<D>,
     trouble: Option<Trouble>,
     displacements: u64,
+}
+
+impl<const D: usize> Passage<D> {
+    fn new(moved: Moved) -> Self {
+        Self { moved, passages: Passages::default(), trouble: None, displacements: 0 }
+    }
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,7 +81,14 @@ enum Trouble {
 
 impl<const D: usize> Water<D> {
     /// The water of a plan that has tracks; the program learns how much of it a particle is.
-    pub fn new(program: &mut Program<D>, settings: &Settings, width: Width) -> Result<Self, RunError> {
+    ///
+    /// Outputs of what passes leave `dues` for the gates.
+    pub fn new(
+        program: &mut Program<D>,
+        settings: &Settings,
+        width: Width,
+        dues: &mut Vec<Due>,
+    ) -> Result<(Self, Gates), RunError> {
         let plan = program.plan;
         let site = Site::<D>::new(plan, flow_of(plan, settings)?)?;
         let cells = start::cells(&site);
@@ -77,10 +98,11 @@ impl<const D: usize> Water<D> {
         }
         let n_slots = program.roles.len();
         let volume = program.volume;
-        let launch = Launch { width, volume, n_slots, n: program.n_components() };
-        let Launched { current, inlets, ranges } = in_medium(&site, launch)?;
-        Ok(Self {
+        let launch = Launch { width, volume, n_slots, n: program.n_components(), dues };
+        let Launched { current, inlets, ranges, gates, watched } = in_medium(&site, launch)?;
+        let water = Self {
             current,
+            watched,
             inlets: Arc::new(inlets),
             ranges,
             cells,
@@ -90,36 +112,45 @@ impl<const D: usize> Water<D> {
             has_memory: plan.reacts_in_steps(),
             most: plan.particles.count.saturating_mul(MOST_OVER).max(MOST_FEW),
             displacements: 0,
-        })
+        };
+        Ok((water, gates))
     }
 
-    /// Takes all parcels through a step, and lets in what comes with the water.
-    pub fn flow_on(&mut self, blocks: &mut Vec<Block<D>>, steps: Steps) -> Result<(), RunError> {
-        let (fresh, entered): (Vec<Block<D>>, Vec<Vec<f64>>) = self.newcomers(steps)?.into_iter().unzip();
+    /// Takes all parcels through a step, and lets in what comes with the water. What passed is returned.
+    pub fn flow_on(&mut self, blocks: &mut Vec<Block<D>>, steps: Steps) -> Result<Passages<D>, RunError> {
+        let mut passages = Passages::default();
+        let (fresh, entered): (Vec<Block<D>>, Vec<Vec<f64>>) =
+            self.newcomers(steps, &mut passages)?.into_iter().unzip();
         let n = blocks.len();
         blocks.extend(fresh);
-        let mut tasks: Vec<(&mut Block<D>, &[f64], Passage)> = blocks
+        let late = |idx: usize| if idx < n { &[][..] } else { &entered[idx - n][..] };
+        let mut tasks: Vec<(&mut Block<D>, &[f64], Passage<D>)> = blocks
             .iter_mut()
             .enumerate()
-            .map(|(idx, block)| {
-                (block, if idx < n { &[][..] } else { &entered[idx - n][..] }, Passage::default())
-            })
+            .map(|(idx, block)| (block, late(idx), Passage::new(self.book.blank())))
             .collect();
-        let (current, book) = (&self.current, &self.book);
+        let (current, watched) = (&self.current, &self.watched);
         parallel::for_each(&mut tasks, &|_, (block, entered, passage)| {
-            passage.moved = book.blank();
-            current.carry(steps, entered, block, passage);
+            current.carry(steps, entered, watched, block, passage);
         });
-        let passages: Vec<Passage> = tasks.into_iter().map(|(_, _, passage)| passage).collect();
-        passages.into_iter().try_for_each(|passage| self.take(passage))?;
+        let found: Vec<Passage<D>> = tasks.into_iter().map(|(_, _, passage)| passage).collect();
+        for mut passage in found {
+            passages.append(std::mem::take(&mut passage.passages));
+            self.take(passage)?;
+        }
         let newcomers = blocks.split_off(n);
         newcomers.into_iter().for_each(|block| parcels::append(blocks, block));
         parcels::gather(blocks);
-        self.check_number(blocks)
+        self.check_number(blocks)?;
+        Ok(passages)
     }
 
     /// Parcels that come in within a step, and the part of it that is over when they do.
-    fn newcomers(&mut self, steps: Steps) -> Result<Vec<(Block<D>, Vec<f64>)>, RunError> {
+    fn newcomers(
+        &mut self,
+        steps: Steps,
+        passages: &mut Passages<D>,
+    ) -> Result<Vec<(Block<D>, Vec<f64>)>, RunError> {
         let window = Window { step: steps.first, t: steps.t, dt: steps.dt };
         let mut list: Vec<(Block<D>, Vec<f64>)> = Vec::new();
         for inlet in self.inlets.iter() {
@@ -127,11 +158,37 @@ impl<const D: usize> Water<D> {
             inlet.release.births(&self.stream, window, &mut births);
             for births in births.chunks(BLOCK) {
                 let block = self.block(births, inlet)?;
-                self.book.enter(inlet.release.door, &block.columns);
+                self.book.enter(inlet.release.door, births.len(), &block.columns);
+                self.note_entries(inlet, births, &block, window, passages);
                 list.push((block, births.iter().map(|birth| birth.entered).collect()));
             }
         }
         Ok(list)
+    }
+
+    /// Notes what comes in through a side that somebody watches.
+    fn note_entries(
+        &self,
+        inlet: &Inlet<D>,
+        births: &[Birth<D>],
+        block: &Block<D>,
+        window: Window,
+        passages: &mut Passages<D>,
+    ) {
+        let Some(side) = inlet.release.door.checked_sub(1).filter(|&side| self.watched.has(side)) else {
+            return;
+        };
+        for (idx, birth) in births.iter().enumerate() {
+            let passed = Passed {
+                what: What::Entered { origin: inlet.release.origin },
+                cargo: Cargo::Parcel,
+                entered_by: Some(side),
+                id: birth.id,
+                t: window.t + birth.entered.max(EARLIEST) * window.dt,
+                place: birth.position,
+            };
+            passages.push(passed, block.columns.len(), |column| block.columns[column][idx]);
+        }
     }
 
     fn block(&self, births: &[Birth<D>], inlet: &Inlet<D>) -> Result<Block<D>, RunError> {
@@ -152,7 +209,7 @@ impl<const D: usize> Water<D> {
         Ok(block)
     }
 
-    fn take(&mut self, passage: Passage) -> Result<(), RunError> {
+    fn take(&mut self, passage: Passage<D>) -> Result<(), RunError> {
         self.book.take(&passage.moved);
         self.displacements += passage.displacements;
         match passage.trouble {
@@ -192,6 +249,7 @@ impl<const D: usize> Water<D> {
             n_slots: self.n_slots,
             has_memory: self.has_memory,
             most: self.most,
+            watched: Watched::default(),
             displacements: 0,
         }
     }

@@ -19,6 +19,10 @@ const FEWEST: u64 = 50_000;
 const DISPLACEMENTS: u64 = 64;
 
 pub(super) fn run(draft: &mut Draft) {
+    // Parcels of water are summed in the order in which they lie: another one would change last bits.
+    if !draft.plan.carries_mass() {
+        return;
+    }
     let Some(cells) = cells(&draft.plan) else { return };
     let n_axes = cells.len();
     let n_cells: usize = cells.iter().product();

@@ -4,10 +4,10 @@
 
 use super::super::check::Checker;
 use super::super::expression::Expr;
-use super::super::{OutputKind, Scenario};
+use super::super::{OutputKind, Rate, Scenario};
 use super::{Dispersion, Flow, Patch, SideRule};
 use crate::diagnostic::Diagnostic;
-use crate::diagnostic::codes::{M025, M026};
+use crate::diagnostic::codes::{M025, M026, M032};
 use crate::source::Span;
 
 /// Reports everything that the particles of a scene cannot do.
@@ -95,9 +95,9 @@ fn of_fluid(checker: &mut Checker<'_>, scenario: &Scenario) {
         patch.limits.is_empty()
             && matches!(patch.rule, SideRule::Reflect | SideRule::Periodic | SideRule::Open)
     };
-    if let Some(span) = moving_walls(scenario)
-        && !(is_uniform(scenario) && patches.iter().all(is_plain))
-    {
+    let is_plain = is_uniform(scenario) && patches.iter().all(is_plain);
+    counted(checker, scenario, is_plain);
+    if let Some(span) = moving_walls(scenario).filter(|_| !is_plain) {
         let help = "leave `frame moving` out, or let the sides be `open`";
         wrong.push(("walls that move with the frame", span, help));
     }
@@ -111,6 +111,56 @@ fn of_fluid(checker: &mut Checker<'_>, scenario: &Scenario) {
                 .help(help),
         );
     }
+}
+
+/// Outputs of what passes need water that is followed on its way, and amounts that are carried.
+fn counted(checker: &mut Checker<'_>, scenario: &Scenario, is_plain: bool) {
+    let counted = scenario.outputs.iter().filter(|output| output.kind.counts_passages());
+    for output in counted {
+        let word = output.kind.word();
+        let mut report = |what: &str, found: String, expected: &str, help: &str| {
+            checker.report(
+                Diagnostic::error(M032, format!("`{word}` {what}"))
+                    .at(output.span, "what comes and goes is counted")
+                    .also(scenario.particles.kind_span, "particles of fluid")
+                    .found(found)
+                    .expected(expected)
+                    .help(help),
+            );
+        };
+        if is_plain {
+            report(
+                "needs particles that carry mass, or water that comes in and goes out",
+                "fluid in uniform flow between sides that nothing goes through".into(),
+                "`particles mass`, or sides such as `inflow` and `outflow`",
+                "with fluid particles `profile`, `map`, `total`, `moments` and `dilution` tell where a species is",
+            );
+            return;
+        }
+        let at_once = |species: &&usize| reacts_at_once(scenario, **species);
+        if output.kind == OutputKind::Budget
+            && let Some(&species) = output.species.iter().find(at_once)
+        {
+            let name = &scenario.species[species].name;
+            report(
+                "is of what parcels carry",
+                format!("`{name}`, which follows from what they carry when somebody looks"),
+                "species without instant reactions or equilibria",
+                "leave it out; `total` gives its amount, `breakthrough` what leaves through a side",
+            );
+            return;
+        }
+    }
+}
+
+/// Whether a species is worked out when somebody looks.
+fn reacts_at_once(scenario: &Scenario, species: usize) -> bool {
+    let is_at_once = |rate: &Rate| matches!(rate, Rate::Instant | Rate::Equilibrium(_));
+    scenario
+        .reactions
+        .iter()
+        .filter(|reaction| is_at_once(&reaction.rate))
+        .any(|own| own.reactants.iter().chain(&own.products).any(|(other, _)| *other == species))
 }
 
 /// Whether coefficients are the same everywhere.
