@@ -168,7 +168,7 @@ fn a_chain_with_retardation_has_the_moments_of_its_law_at_any_step() {
     }
 }
 
-/// One unit of A exchanges with what does not move, or with what spreads otherwise, at k Δt from 0.05
+/// One unit of A exchanges with what does not move, or with what spreads otherwise, at k Δt from 0.25
 /// to 40. References: equation 1.7 with `1/R = 0`, and with diffusion of each species' own.
 #[test]
 fn exchange_has_the_moments_of_its_law_at_any_step() {
@@ -197,10 +197,44 @@ output moments A, S at t = 20 s
     ];
     for (species, speed, spread) in cases {
         let network = Network { rates: rates.clone(), speed: speed.to_vec(), spread: spread.to_vec() };
-        for step in ["0.05 s", "20 s", "auto(courant <= 0.005, dispersion <= 0.005)"] {
+        for step in ["0.25 s", "20 s", "auto(courant <= 0.01, dispersion <= 0.01)"] {
             let finished = run(&scene(species, step));
             hold(&finished, &network, 20.0, 50_000.0, &[1.0; 2], &format!("{species}, {step}"));
         }
+    }
+}
+
+/// Exchange that is as good as in equilibrium: thousands of turns to and fro in a step, of which some end elsewhere.
+/// Reference: equation 1.7.
+#[test]
+fn fast_exchange_has_the_moments_of_its_law() {
+    let scene = |step: &str| {
+        format!(
+            "lamella 1
+species A, S immobile, B retardation 2.0
+reaction exchange: A <-> S @ forward 1000 /s, backward 500 /s
+reaction leak:     A -> B @ 0.2 /s
+reaction fade:     S ->   @ 0.05 /s
+domain line x = -200 m .. 200 m
+boundary left, right open
+flow uniform 1 m/s
+dispersion 0.1 m^2/s
+source pulse: A = 1 mol/m^2 at point(0 m)
+particles mass 100_000
+run to 10 s, step {step}
+output moments A, S, B at t = 10 s
+output breakthrough A, S, B at x = 2 m every 10 s
+"
+        )
+    };
+    let rates = DMatrix::from_row_slice(3, 3, &[-1000.2, 500.0, 0.0, 1000.0, -500.05, 0.0, 0.2, 0.0, 0.0]);
+    let network = Network { rates, speed: vec![1.0, 0.0, 0.5], spread: vec![0.1, 0.0, 0.05] };
+    for step in ["10 s", "0.5 s", "auto(courant <= 0.005, dispersion <= 0.005)"] {
+        let finished = run(&scene(step));
+        hold(&finished, &network, 10.0, 100_000.0, &[1.0; 3], step);
+        // What rests passes no plane.
+        assert_eq!(finished.last(OutputKind::Breakthrough, 1)[3], 0.0);
+        assert!(finished.last(OutputKind::Breakthrough, 0)[3] > 10_000.0);
     }
 }
 
@@ -312,4 +346,124 @@ fn planes_see_what_particles_are_when_they_pass() {
         let bound = 4.5 * (p * (1.0 - p) / 200_000.0).sqrt();
         assert!((found[2] - p).abs() < bound, "species {species}: {} {p}", found[2]);
     }
+}
+
+/// The same lines of chemistry on particles of fluid and on particles that carry mass.
+/// Reference: `exp(t M)` of all that there is, which transport does not change.
+#[test]
+fn the_same_chemistry_runs_on_both_kinds_of_particles() {
+    let scene = |kind: &str| {
+        format!(
+            "lamella 1
+species A, B, C, E
+param k = 0.2 /d
+reaction chain: A -> B @ k
+reaction split: B -> 0.7 C + 0.3 E @ 0.3 /d * B
+reaction both:  C <-> E @ forward 0.5 /d, backward k
+reaction loss:  E -> @ 0.1 /d
+domain line x = 0 m .. 40 m
+boundary left, right open
+initial A = 1 mol/m^3 * exp(-(x - 12 m)^2 / (2 m^2))
+flow uniform 1 m/d
+dispersion 0.1 m^2/d
+particles {kind} 200_000
+run to 6 d, step 2 d
+output total A, B, C, E at t = 2 d, 6 d
+output profile A, B, C, E at t = 6 d on 40
+"
+        )
+    };
+    let rates = DMatrix::from_row_slice(
+        4,
+        4,
+        &[-0.2, 0.0, 0.0, 0.0, 0.2, -0.3, 0.0, 0.0, 0.0, 0.21, -0.5, 0.2, 0.0, 0.09, 0.5, -0.3],
+    );
+    let mass = (2.0 * std::f64::consts::PI).sqrt();
+    let mut profiles = Vec::new();
+    for kind in ["fluid", "mass"] {
+        let finished = run(&scene(kind));
+        for snapshot in &finished.snapshots {
+            let exact = exponential(&rates * (snapshot.t / 86_400.0));
+            match &snapshot.values {
+                Values::Total { amount } => {
+                    for (species, amount) in amount.iter().enumerate() {
+                        let p = exact[(species, 0)];
+                        // Fluid particles sample the pulse by their places: 200 000 over 40 m, 12 500 in it.
+                        let n = if kind == "mass" { 200_000.0 } else { 12_500.0 };
+                        let bound = 4.5 * mass * (0.25_f64 / n).sqrt();
+                        assert!((amount - mass * p).abs() < bound, "{kind}: {amount} {}", mass * p);
+                    }
+                }
+                Values::Binned { mean, .. } => profiles.push(mean.clone()),
+                _ => panic!("an output that was not asked for"),
+            }
+        }
+    }
+    for (fluid, mass) in profiles[0].iter().zip(&profiles[1]) {
+        let largest = fluid.iter().fold(0.0, |a: f64, &b| a.max(b));
+        // The flow has taken all fluid from behind: no value there.
+        let known = || fluid.iter().zip(mass).filter(|(fluid, _)| !fluid.is_nan());
+        assert!(known().count() > 30);
+        for (fluid, mass) in known() {
+            // Thousands of particles in the bins that count: 2 % of the peak each.
+            assert!((fluid - mass).abs() < 0.06 * largest + 1e-3, "{fluid} {mass}");
+        }
+    }
+}
+
+/// What a side at a concentration lets in decays on its way, within its first step too.
+/// Reference: `decaying_ogata_banks`; parent and daughter together are as if nothing reacted.
+#[test]
+fn a_side_at_a_concentration_feeds_what_decays() {
+    for step in ["2 d", "0.25 d"] {
+        let text = format!(
+            "lamella 1
+species A retardation 2.0, B retardation 2.0
+reaction decay: A -> B @ 0.8 /d
+domain line x = 0 m .. 10 m
+boundary left concentration A = 1 mol/m^3
+boundary right outflow
+flow uniform 1 m/d
+dispersion 0.2 m^2/d
+particles mass A 200_000, B 1
+run to 4 d, step {step}
+output profile A, B at t = 4 d on 50
+reference decaying for A = decaying_ogata_banks(velocity = 1 m/d, dispersion = 0.2 m^2/d, inlet = 1 mol/m^3, rate = 0.8 /d, retardation = 2.0)
+reference all for A = decaying_ogata_banks(velocity = 1 m/d, dispersion = 0.2 m^2/d, inlet = 1 mol/m^3, rate = 0 /d, retardation = 2.0)
+measure error_A = l2(profile.A - decaying) / l2(decaying)
+measure error_all = l2(profile.A + profile.B - all) / l2(all)
+"
+        );
+        let finished = run(&text);
+        let plan = &finished.compiled.plan;
+        let evaluated = lamella::measure::evaluate(
+            plan,
+            &finished.compiled.evaluation,
+            &finished.snapshots,
+            &finished.outcome,
+        )
+        .expect("results and references fit");
+        // 15 000 particles in each bin of 0.2 m that is full: 1 %.
+        for measure in &evaluated.measures {
+            assert!(measure.value < 0.02, "{step}: {} {}", measure.name, measure.value);
+        }
+    }
+}
+
+/// What no output reads is not followed, and what is left has the same law: here the same numbers.
+#[test]
+fn what_nobody_reads_is_left_out() {
+    let all = chain("A, B retardation 2.0, C retardation 4.0", 20_000, 4.0, "1 s");
+    let less = all.replace("output moments A, B, C", "output moments A");
+    let compiled = compile(&less);
+    let transport = compiled.plan.transport.as_ref().expect("masses");
+    assert_eq!(transport.populations.len(), 1);
+    let decay = transport.decay.as_ref().expect("A still goes");
+    assert_eq!((decay.reactions.len(), decay.reactions[0].outcomes.len()), (1, 0));
+    // Not all are drawn alike: numbers of particles are shared among fewer species.
+    let network =
+        Network { rates: DMatrix::from_row_slice(1, 1, &[-0.6]), speed: vec![1.0], spread: vec![0.1] };
+    hold(&run(&less), &network, 4.0, 20_000.0, &[1.0], "A alone");
+    let none = less.replace("reaction first:  A -> B @ 0.6 /s\n", "");
+    assert!(compile(&none).plan.transport.expect("masses").decay.is_none());
 }

@@ -39,6 +39,8 @@ mod table {
     /// One particle asked whether it reacts, and one reaction of it.
     pub(super) const WAIT: f64 = 6.0;
     pub(super) const TURN: f64 = 60.0;
+    /// Reactions to and fro that are followed one by one; more are taken together.
+    pub(super) const MOST_TURNS: f64 = 500.0;
     /// Sub-steps that a particle takes in a step of `step auto` in cells.
     pub(super) const SUB_STEPS: f64 = crate::plan::auto_step::CELLS_PER_STEP;
     /// One particle observed once: positions worked out again, species restored, sums.
@@ -143,7 +145,7 @@ fn track_cost(transport: &Transport) -> f64 {
 /// Nanoseconds per particle and step, with the sub-steps that are expected.
 fn react_cost(plan: &Plan, scales: Option<&TimeScales>) -> f64 {
     if let Some(decay) = plan.transport.as_ref().and_then(|transport| transport.decay.as_ref()) {
-        return table::WAIT + table::TURN * turns::per_step(plan, decay);
+        return table::WAIT + table::TURN * turns::per_step(plan, decay).min(table::MOST_TURNS);
     }
     let Some(chemistry) = &plan.chemistry else { return 0.0 };
     let Some(kinetics) = &chemistry.kinetics else { return 0.0 };

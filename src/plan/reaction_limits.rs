@@ -36,7 +36,7 @@ pub(super) fn check(
             name: "reactions of a particle per step".into(),
             formula: "k dt on the mean over the run",
             value: turns::per_step(plan, decay),
-            advice: "any: each is followed, so far above 1 a step takes longer and is no less right",
+            advice: "any: they are followed, hundreds to and fro together, and a long step is as right as a short one",
         });
     }
     let (Some(scales), Some(kinetics)) =

@@ -63,13 +63,13 @@ fn build_cauchy_inflow(values: &[f64]) -> Built {
 }
 
 #[derive(Clone, Copy)]
-struct Column {
-    velocity: f64,
-    dispersion: f64,
+pub(super) struct Column {
+    pub velocity: f64,
+    pub dispersion: f64,
 }
 
 impl Column {
-    fn fixed_concentration(self, x: f64, t: f64) -> f64 {
+    pub fn fixed_concentration(self, x: f64, t: f64) -> f64 {
         if x <= 0.0 {
             return 1.0;
         }
@@ -79,7 +79,7 @@ impl Column {
         0.5 * (erfc(behind) + exp(-behind * behind) * erfcx(ahead))
     }
 
-    fn fixed_flux(self, x: f64, t: f64) -> f64 {
+    pub fn fixed_flux(self, x: f64, t: f64) -> f64 {
         let x = x.max(0.0);
         let Some((behind, ahead)) = self.similarity(x, t) else {
             return self.plug(x, t);
@@ -94,7 +94,7 @@ impl Column {
     }
 
     /// ξ₋ and ξ₊, if the front has spread at all.
-    fn similarity(self, x: f64, t: f64) -> Option<(f64, f64)> {
+    pub fn similarity(self, x: f64, t: f64) -> Option<(f64, f64)> {
         let width = 2.0 * (self.dispersion * t).sqrt();
         let travelled = self.velocity * t;
         (t > 0.0 && width > 0.0).then(|| ((x - travelled) / width, (x + travelled) / width))

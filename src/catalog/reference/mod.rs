@@ -4,6 +4,7 @@
 //! May use the words. It deliberately reads no result: `measure` compares.
 
 mod arguments;
+mod decaying_inflow;
 mod front;
 mod front_covariance;
 mod front_gamma;
@@ -43,6 +44,8 @@ pub const ALL: &[Item] = &[
     pulse_gamma::ITEM,
     inflow::OGATA_BANKS,
     inflow::CAUCHY_INFLOW,
+    decaying_inflow::FIXED_CONCENTRATION,
+    decaying_inflow::FIXED_FLUX,
     michaelis_menten::ITEM,
 ];
 

@@ -16,7 +16,7 @@ fn plain_value(name: &str) -> f64 {
         "D" | "dispersion" => 1.3e-7,
         "eta" => 0.5,
         "eta1" => 0.3,
-        "chi" | "chi1" => 1e-3,
+        "chi" | "chi1" | "rate" => 1e-3,
         "velocity" => 1e-4,
         "width" => 0.01,
         "V" => 1e-3,

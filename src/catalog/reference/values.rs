@@ -154,6 +154,35 @@ fn inflow_follows_the_printed_formulas() {
 }
 
 #[test]
+fn decaying_inflow_follows_the_inverted_transform() {
+    // mpmath, Talbot's inversion with 40 digits of `e^{rx}/s` and `w/(w − Er) e^{rx}/s`, r = (w − √(w² + 4E(s + k)))/2E,
+    // v = 1e-4 m/s, D = 1e-6 m²/s: x, t, R, k, prescribed concentration, prescribed flux.
+    let table = [
+        (0.0, 50.0, 1.0, 5e-4, 1.0, 0.576_734_089_415_894_85),
+        (0.05, 600.0, 2.0, 5e-4, 0.231_726_351_953_653_33, 0.142_405_564_826_383_22),
+        (0.1, 3000.0, 2.0, 1e-3, 0.177_653_480_581_867_88, 0.149_982_706_145_967_39),
+        (0.3, 3000.0, 1.0, 5e-4, 0.164_709_026_904_944_73, 0.146_578_216_303_567_29),
+        (0.2, 1000.0, 1.0, 1e-7, 0.017_451_793_423_303_273, 0.010_951_391_893_011_993),
+        (0.1, 1e6, 3.0, 2e-3, 0.014_705_341_890_567_208, 0.010_341_640_644_489_962),
+    ];
+    for (x, t, retardation, rate, concentration, flux) in table {
+        let arguments = [1e-4, 1e-6, 3.0, rate, retardation, 0.5];
+        // Terms of the flux boundary are w²/2kE times as large as the boundary's value, and rounded as such.
+        let bound = 1e-12 + 1e-15 * 0.5 / (100.0 * rate * retardation) / flux;
+        assert_close(value("decaying_ogata_banks", &arguments, t, x + 0.5), 3.0 * concentration, 1e-12);
+        assert_close(value("decaying_cauchy_inflow", &arguments, t, x + 0.5), 3.0 * flux, bound);
+    }
+    // Both ways of working it out agree where one takes over from the other: kD/v² = 1e-6.
+    for x in [0.05, 0.1] {
+        let of = |rate: f64| value("decaying_cauchy_inflow", &[1e-4, 1e-6, 1.0, rate, 1.0, 0.0], 1000.0, x);
+        assert_close(of(0.999_999e-8), of(1.000_001e-8), 1e-8);
+    }
+    // Without decay and retardation it is the plain inflow.
+    let plain = value("cauchy_inflow", &[1e-4, 1e-6, 2.0, 0.0], 700.0, 0.08);
+    assert_eq!(value("decaying_cauchy_inflow", &[1e-4, 1e-6, 2.0, 0.0, 1.0, 0.0], 700.0, 0.08), plain);
+}
+
+#[test]
 fn flux_inflow_brings_what_enters() {
     // Amount in the half-space = velocity · inlet · t.
     let profile = |x: f64| value("cauchy_inflow", &[1e-4, 1e-6, 2.0, 0.0], 1000.0, x);

@@ -50,7 +50,7 @@ pub struct Log<'a> {
     pub units: &'a Units,
     pub events: &'a mut Vec<Event>,
     /// Per way and origin what has turned; empty as long as nothing has.
-    pub turned: &'a mut Vec<u64>,
+    pub turned: &'a mut Vec<u128>,
     pub n_ways: usize,
 }
 
@@ -76,12 +76,12 @@ impl Turns for Log<'_> {
         self.population = population;
     }
 
-    fn turned(&mut self, id: u64, way: usize) {
+    fn turned(&mut self, id: u64, way: usize, times: u64) {
         let n = self.units.n_origins();
         if self.turned.is_empty() {
             self.turned.resize(self.n_ways * n, 0);
         }
-        self.turned[way * n + flock::origin(id)] += 1;
+        self.turned[way * n + flock::origin(id)] += u128::from(times);
     }
 }
 
@@ -99,7 +99,7 @@ pub struct Book {
     /// What turns into what.
     ways: Vec<Way>,
     /// Per way and origin.
-    turned: Vec<u64>,
+    turned: Vec<u128>,
 }
 
 impl Book {
@@ -139,7 +139,7 @@ impl Book {
     }
 
     /// Adds what has turned, per way and origin.
-    pub fn turn(&mut self, counts: &[u64]) {
+    pub fn turn(&mut self, counts: &[u128]) {
         self.turned.iter_mut().zip(counts).for_each(|(sum, n)| *sum += n);
     }
 
@@ -152,45 +152,50 @@ impl Book {
         let n = self.units.n_origins();
         let counts = self.entered[population * n..][..n].iter().zip(&self.doors);
         let own: Vec<u64> = counts.map(|(&n, &other)| if other == door { n } else { 0 }).collect();
-        self.units.sum(population, &own)
+        self.units.sum(population, own.iter().map(|&n| n as f64))
     }
 
     /// What went through a door since the start.
     pub fn left(&self, population: usize, door: usize) -> f64 {
         let n = self.units.n_origins();
-        self.units.sum(population, &self.left[(population * self.n_doors + door) * n..][..n])
+        let counts = &self.left[(population * self.n_doors + door) * n..][..n];
+        self.units.sum(population, counts.iter().map(|&n| n as f64))
     }
 
     /// What a reaction made of a population since the start, and what it took.
     pub fn turned(&self, population: usize, reaction: usize) -> (f64, f64) {
         let n = self.units.n_origins();
-        let (mut made, mut taken) = (0.0, 0.0);
+        let mut counts = [vec![0_u128; n], vec![0_u128; n]];
         for (idx, way) in self.ways.iter().enumerate().filter(|(_, way)| way.reaction == reaction) {
-            let counts = &self.turned[idx * n..][..n];
-            if way.to == Some(population) {
-                made += self.units.sum(population, counts);
-            }
-            if way.from == population {
-                taken += self.units.sum(population, counts);
+            let is_of = [way.to == Some(population), way.from == population];
+            for (sums, _) in counts.iter_mut().zip(is_of).filter(|(_, is_of)| *is_of) {
+                sums.iter_mut().zip(&self.turned[idx * n..][..n]).for_each(|(sum, count)| *sum += count);
             }
         }
+        let [made, taken] = counts.map(|counts| self.units.sum(population, counts.iter().map(|&n| n as f64)));
         (made, taken)
+    }
+
+    /// What all reactions made of a population less what they took: particles are counted first, as many may have
+    /// gone to and fro.
+    pub fn net(&self, population: usize) -> f64 {
+        let n = self.units.n_origins();
+        let mut net = vec![0_i128; n];
+        for (idx, way) in self.ways.iter().enumerate() {
+            let sign = i128::from(way.to == Some(population)) - i128::from(way.from == population);
+            net.iter_mut().zip(&self.turned[idx * n..][..n]).for_each(|(sum, &n)| *sum += sign * n as i128);
+        }
+        self.units.sum(population, net.iter().map(|&n| n as f64))
     }
 
     pub fn n_reactions(&self) -> usize {
         self.ways.iter().map(|way| way.reaction + 1).max().unwrap_or(0)
     }
 
-    /// Everything that came or was made, and everything that went or was taken.
+    /// Everything that came, and everything that went, through doors.
     pub fn whole(&self, population: usize) -> (f64, f64) {
         let doors = 0..self.n_doors;
-        let mut entered: f64 = doors.clone().map(|door| self.entered(population, door)).sum();
-        let mut left: f64 = doors.map(|door| self.left(population, door)).sum();
-        for reaction in 0..self.n_reactions() {
-            let (made, taken) = self.turned(population, reaction);
-            entered += made;
-            left += taken;
-        }
-        (entered, left)
+        let entered = doors.clone().map(|door| self.entered(population, door)).sum();
+        (entered, doors.map(|door| self.left(population, door)).sum())
     }
 }

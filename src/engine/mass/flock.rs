@@ -126,6 +126,18 @@ mod tests {
     use super::*;
 
     #[test]
+    fn what_turns_finds_room_in_its_new_flocks() {
+        let mut flocks: Vec<Flock<1>> = vec![Flock::new(0), Flock::new(1), Flock::new(0)];
+        (0..BLOCK as u64 - 2).for_each(|k| flocks[0].push(id(0, k), [k as f64]));
+        let moved = (0..5).map(|k| (if k == 3 { 2 } else { 0 }, id(1, k), [k as f64])).collect();
+        spread(&mut flocks, moved);
+        let lengths: Vec<(usize, usize)> =
+            flocks.iter().map(|flock| (flock.population, flock.len())).collect();
+        assert_eq!(lengths, [(0, BLOCK), (1, 0), (0, 2), (2, 1)]);
+        assert_eq!((flocks[2].ids[1], flocks[3].ids[0]), (id(1, 4), id(1, 3)));
+    }
+
+    #[test]
     fn nothing_is_lost_when_flocks_are_gathered() {
         let mut flocks: Vec<Flock<1>> = Vec::new();
         for idx in 0..40 {

@@ -20,7 +20,7 @@ use super::units::Units;
 pub struct Yield<const D: usize> {
     pub events: Vec<Event>,
     /// Per way and origin what has turned; empty if nothing has.
-    pub turned: Vec<u64>,
+    pub turned: Vec<u128>,
     /// What is of another population now.
     pub moved: Vec<(usize, u64, [f64; D])>,
     pub trouble: Option<Trouble>,

@@ -134,7 +134,7 @@ impl<const D: usize> Scene<'_, D> {
         for flock in self.flocks.iter().filter(|flock| flock.population == population) {
             flock.ids.iter().for_each(|&id| counts[flock::origin(id)] += 1);
         }
-        self.units.sum(population, &counts)
+        self.units.sum(population, counts.iter().map(|&n| n as f64))
     }
 
     /// Positions in the order of numbers; the mass stands in the column of the particle's species.

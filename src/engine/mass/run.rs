@@ -264,8 +264,10 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
         let scene = self.scene();
         let defect = |population: usize| {
             let (entered, left) = self.book.whole(population);
-            let error = (scene.inside(population) + left - entered).abs();
-            if entered > 0.0 { error / entered } else { error }
+            let made = self.book.net(population);
+            let error = (scene.inside(population) + left - entered - made).abs();
+            let whole = entered + made.max(0.0);
+            if whole > 0.0 { error / whole } else { error }
         };
         (0..self.carriers.len()).map(defect).collect()
     }

@@ -161,9 +161,9 @@ impl<const D: usize> Scene<'_, D> {
         let n_reactions = self.book.n_reactions();
         for reaction in 0..n_reactions {
             let (made, taken) = population.map_or((0.0, 0.0), |own| self.book.turned(own, reaction));
-            whole += made - taken;
             rows.push(row(n_doors + reaction, vec![made - taken, made, taken]));
         }
+        whole += population.map_or(0.0, |population| self.book.net(population));
         let inside = population.map_or(0.0, |population| self.inside(population));
         let last = n_doors + n_reactions;
         rows.push(row(last, vec![inside, f64::NAN, f64::NAN]));

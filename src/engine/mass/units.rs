@@ -45,8 +45,8 @@ impl Units {
     }
 
     /// Mass of so many particles of each origin.
-    pub fn sum(&self, population: usize, counts: &[u64]) -> f64 {
-        counts.iter().zip(self.row(population)).map(|(&n, unit)| n as f64 * unit).sum()
+    pub fn sum(&self, population: usize, counts: impl Iterator<Item = f64>) -> f64 {
+        counts.zip(self.row(population)).map(|(n, unit)| n * unit).sum()
     }
 
     pub fn largest(&self) -> f64 {

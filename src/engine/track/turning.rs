@@ -3,7 +3,7 @@
 //! Owns the order of work where states, walking times and walls meet. May use the tracker and `fates`. It
 //! deliberately stores no books: what happens is told with the population that it happened to.
 
-use super::fates::{Chain, Draw, Piece, Span, Spent, TooManyTurns};
+use super::fates::{Chain, Close, Draw, Piece, Span, Spent, TooManyTurns};
 use super::lanes::{LANES, Lane, Lanes};
 use super::medium::{Carrier, Medium};
 use super::monitors::Crossing;
@@ -17,8 +17,8 @@ const BEFORE: u64 = 1 << 43;
 pub trait Turns: Events {
     /// What happens next happens to a particle of this population.
     fn is_now(&mut self, population: usize);
-    /// A particle has taken a way.
-    fn turned(&mut self, id: u64, way: usize);
+    /// A particle has taken a way so often.
+    fn turned(&mut self, id: u64, way: usize, n: u64);
 }
 
 /// What a group walks with while it turns.
@@ -56,8 +56,8 @@ pub struct Fates {
     ranges: [(usize, usize); LANES],
     /// What becomes of a particle at the end; `None` if it is gone.
     ends: [Option<usize>; LANES],
-    /// Pieces that were over when a particle left.
-    cuts: [Option<usize>; LANES],
+    /// Where a particle was among its pieces as it left.
+    cuts: [Option<Spot>; LANES],
 }
 
 impl Fates {
@@ -134,18 +134,23 @@ impl Fates {
         Ok(())
     }
 
-    /// When a particle had walked so long, in which state, and after how many pieces.
-    fn at(&self, chain: &Chain, lane: usize, walk: f64) -> (f64, usize, usize) {
+    /// Where a particle was when it had walked so long, and in which state.
+    fn at(&self, chain: &Chain, lane: usize, draw: Draw, walk: f64) -> Spot {
         let (from, to) = self.ranges[lane];
+        let state = self.states[lane];
         let mut before = Spent::default();
-        let mut last = (self.time[lane], self.states[lane], 0);
         if from == to {
-            return (chain.time_of(self.states[lane], walk).min(self.time[lane]), self.states[lane], 0);
+            let time = chain.time_of(state, walk).min(self.time[lane]);
+            return Spot { time, state, over: 0, trips: 0 };
         }
-        for (idx, piece) in self.pieces[from..to].iter().enumerate() {
-            if piece.end.walk > before.walk {
-                let time = before.time + chain.time_of(piece.state, (walk - before.walk).max(0.0));
-                last = (time.min(piece.end.time), piece.state, idx);
+        let mut last = Spot { time: self.time[lane], state, over: 0, trips: 0 };
+        for (over, piece) in self.pieces[from..to].iter().enumerate() {
+            let whole = piece.end.walk - before.walk;
+            if whole > 0.0 {
+                let part = ((walk - before.walk) / whole).clamp(0.0, 1.0);
+                let (state, trips) = chain.amid(draw, piece, part);
+                let time = before.time + part * (piece.end.time - before.time);
+                last = Spot { time, state, over, trips };
                 if piece.end.walk >= walk {
                     break;
                 }
@@ -158,10 +163,16 @@ impl Fates {
     /// Takes what has become of each particle, and tells it. `gone` are those that had left before.
     fn settle<const D: usize>(&mut self, gone: u64, lanes: &mut Lanes<D>, events: &mut impl Turns) {
         for lane in (0..lanes.n).filter(|lane| gone >> lane & 1 == 0) {
-            let (from, to) = self.ranges[lane];
-            let to = self.cuts[lane].map_or(to, |cut| from + cut);
-            for way in self.pieces[from..to].iter().filter_map(|piece| piece.way) {
-                events.turned(lanes.ids[lane], way);
+            let (from, end) = self.ranges[lane];
+            let to = self.cuts[lane].map_or(end, |cut| (from + cut.over).min(end));
+            let id = lanes.ids[lane];
+            self.pieces[from..to].iter().for_each(|piece| tell(id, piece, events));
+            if let Some(cut) = self.cuts[lane]
+                && let Some(Piece { state, close: Close::Trips { ways, .. }, .. }) =
+                    self.pieces[to..end].first()
+            {
+                events.turned(id, ways[0], cut.trips + u64::from(cut.state != *state));
+                events.turned(id, ways[1], cut.trips);
             }
             match self.ends[lane] {
                 Some(state) => self.states[lane] = state,
@@ -186,9 +197,7 @@ impl Fates {
             self.pieces.clear();
             let found = chain.follow(draw, self.states[lane], span, chain.early(draw), &mut self.pieces);
             let (_, becomes) = found.map_err(|TooManyTurns| TooManySubSteps { id: draw.id, step })?;
-            for way in self.pieces.iter().filter_map(|piece| piece.way) {
-                events.turned(draw.id, way);
-            }
+            self.pieces.iter().for_each(|piece| tell(draw.id, piece, events));
             match becomes {
                 Some(state) => self.states[lane] = state,
                 None => lanes.gone |= 1 << lane,
@@ -198,34 +207,57 @@ impl Fates {
     }
 }
 
+/// Tells the turns of a piece.
+fn tell(id: u64, piece: &Piece, events: &mut impl Turns) {
+    match piece.close {
+        Close::End => {}
+        Close::Way(way) => events.turned(id, way, 1),
+        Close::Trips { ways, n, .. } => ways.into_iter().for_each(|way| events.turned(id, way, n)),
+    }
+}
+
+/// A moment on the way of a particle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Spot {
+    /// Since the displacement began, s.
+    time: f64,
+    state: usize,
+    /// Pieces that are over.
+    over: usize,
+    /// Round trips of the next one that are over.
+    trips: u64,
+}
+
 /// Tells what happens on a displacement with its time and the population at that time.
 struct Told<'a, E> {
     company: Company<'a>,
     fates: &'a mut Fates,
     events: &'a mut E,
-    /// When the displacement began, s.
+    /// Number of the displacement, and when it began, s.
+    number: u64,
     start: Lane,
     earliest: f64,
 }
 
 impl<E: Turns> Told<'_, E> {
-    /// Time of what happens after so much of the walk, and the pieces that were over.
-    fn place(&mut self, lane: usize, walk: f64) -> (f64, usize) {
-        let (time, state, over) = self.fates.at(self.company.chain, lane, walk);
-        self.events.is_now(state);
-        ((self.start[lane] + time).max(self.earliest), over)
+    /// Where a particle is after so much of its walk, and when.
+    fn place(&mut self, id: u64, lane: usize, walk: f64) -> (f64, Spot) {
+        let draw = Draw { id, number: self.number };
+        let spot = self.fates.at(self.company.chain, lane, draw, walk);
+        self.events.is_now(spot.state);
+        ((self.start[lane] + spot.time).max(self.earliest), spot)
     }
 }
 
 impl<E: Turns> Events for Told<'_, E> {
     fn left(&mut self, id: u64, exit: Exit, walk: f64) {
-        let (t, over) = self.place(exit.lane, walk);
-        self.fates.cuts[exit.lane] = Some(over);
+        let (t, spot) = self.place(id, exit.lane, walk);
+        self.fates.cuts[exit.lane] = Some(spot);
         self.events.left(id, exit, t);
     }
 
     fn crossed(&mut self, id: u64, plane: usize, crossing: Crossing, walk: f64) {
-        let (t, _) = self.place(crossing.lane, walk);
+        let (t, _) = self.place(id, crossing.lane, walk);
         self.events.crossed(id, plane, crossing, t);
     }
 }
@@ -301,7 +333,8 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
             let gone = bench.lanes.gone;
             if fates.walk.iter().any(|walk| *walk > 0.0) {
                 bench.leap.assign(&fates.walk);
-                let mut told = Told { company, fates, events, start, earliest: t + EARLIEST * dt };
+                let earliest = t + EARLIEST * dt;
+                let mut told = Told { company, fates, events, number, start, earliest };
                 // Times are those of the walk: what is told is placed by the pieces.
                 self.displace(carrier, number, (&[0.0; LANES], f64::NEG_INFINITY), bench, &mut told);
             }
