@@ -40,7 +40,7 @@ mod table {
     pub(super) const WAIT: f64 = 6.0;
     pub(super) const TURN: f64 = 60.0;
     /// Reactions to and fro that are followed one by one; more are taken together.
-    pub(super) const MOST_TURNS: f64 = 500.0;
+    pub(super) const MOST_TURNS: f64 = 120.0;
     /// Sub-steps that a particle takes in a step of `step auto` in cells.
     pub(super) const SUB_STEPS: f64 = crate::plan::auto_step::CELLS_PER_STEP;
     /// One particle observed once: positions worked out again, species restored, sums.

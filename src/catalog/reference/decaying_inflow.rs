@@ -15,7 +15,7 @@ pub(super) const FIXED_CONCENTRATION: Item = Item {
     arguments: ARGUMENTS,
     equation: "c = ½ inlet [exp((w − u) x/2E) erfc((x − u t)/s) + exp((w + u) x/2E) erfc((x + u t)/s)], w = v/R, E = D/R, u = √(w² + 4 k E), s = 2 √(E t)",
     summary: "flow into a clean half-space x > x0 whose boundary keeps the concentration `inlet`, with decay of all that is there",
-    source: "van Genuchten & Alves 1982, USDA Technical Bulletin 1661; Bear 1972, Dynamics of Fluids in Porous Media, section 10.6",
+    source: "van Genuchten & Alves 1982, USDA Technical Bulletin 1661, first-order decay with a fixed boundary value",
     build: build_fixed_concentration,
 };
 
@@ -52,7 +52,7 @@ const ARGUMENTS: &[Argument; 6] = &[
 /// Equation: `c = ½ inlet e^{(w − u)x/2E} [erfc(ξ₋) + e^{−ξ₋²} erfcx(ξ₊)]`, `ξ∓ = (x ∓ u t)/(2√(E t))`.
 /// Symbols: x distance from the boundary, `w = v/R`, `E = D/R`, `u = √(w² + 4kE)`, k rate.
 /// Dimensions and range: concentration; 0 to `inlet`, which is also the value outside (x < 0).
-/// Source: van Genuchten & Alves 1982, USDA Technical Bulletin 1661; Bear 1972, section 10.6.
+/// Source: van Genuchten & Alves 1982, USDA Technical Bulletin 1661.
 /// Shape: a front that comes to rest as `e^{(w − u)x/2E}`.
 fn build_fixed_concentration(values: &[f64]) -> Built {
     let (column, inlet, x0) = column(values)?;

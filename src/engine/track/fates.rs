@@ -336,7 +336,7 @@ impl Chain {
     ///
     /// - Equation: chance of the first: `μ₁/R₁ / (μ₁/R₁ + μ₂/R₂)`, `μ = 1/k`; `⌊f n⌋` trips.
     /// - Symbols: `f` part of the walk.
-    /// - Range: 128 trips and more.
+    /// - Range: 16 trips and more.
     /// - Source: waiting times in any order are equally likely.
     /// - Shape: one particle; right to one part in the number of trips.
     pub fn amid(&self, draw: Draw, piece: &Piece, part: f64) -> (usize, u64) {

@@ -7,10 +7,10 @@ use crate::maths::scalar::{cos, ln, log1p};
 use crate::state::stream::Stream;
 
 /// Fewer round trips than this are made one by one.
-const FEWEST: f64 = 128.0;
+const FEWEST: f64 = 16.0;
 /// More are made in several goes.
 const MOST: f64 = (1_u64 << 40) as f64;
-/// Standard deviations by which round trips must fit a time: they do not once in 10¹⁸.
+/// Standard deviations by which round trips must fit a time: of 16 they do not once in 10¹¹, of more less often.
 const MARGIN: f64 = 12.0;
 
 /// Uniform numbers of one particle and displacement, one after the other.
@@ -88,8 +88,8 @@ impl Stop {
 ///
 /// - Equation: `n μ + 12 σ √n ≤ T`, `μ = 1/k₁ + 1/k₂`, `σ² = 1/k₁² + 1/k₂²`, and the same for the walk.
 /// - Symbols: `k` rates, `T` the time.
-/// - Range: 128 to 2⁴⁰.
-/// - Source: sums of exponential waiting times; beyond 12 standard deviations there are 10⁻¹⁸ of them.
+/// - Range: 16 to 2⁴⁰.
+/// - Source: sums of exponential waiting times; `P(Σ > n(1 + δ)) < e^{−n(δ − ln(1 + δ))}`, 10⁻¹¹ for `n = 16`, `δ = 12/√n`.
 /// - Shape: a whole number.
 pub fn fitting(stops: [Stop; 2], time: f64, walk: f64) -> Option<f64> {
     let waits = stops.map(|stop| stop.wait());
@@ -152,7 +152,7 @@ mod tests {
         assert!(n * 1.5 + 12.0 * (n * 1.25_f64).sqrt() <= 1e6 && n > 6e5);
         let n = fitting(stops, 1e6, 1e4).expect("many");
         assert!(n * 0.5 + 12.0 * (n * 0.25_f64).sqrt() <= 1e4 && n > 1.5e4);
-        assert_eq!(fitting(stops, 100.0, f64::INFINITY), None);
+        assert_eq!(fitting(stops, 50.0, f64::INFINITY), None);
         assert_eq!(fitting([stop(1e300, 1.0), stop(1e300, 1.0)], 1e10, f64::INFINITY), Some(MOST));
         assert_eq!(fitting([stop(0.0, 1.0), stop(1.0, 1.0)], 1e10, f64::INFINITY), None);
     }
