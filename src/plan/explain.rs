@@ -115,11 +115,9 @@ fn stage_words(stage: Stage) -> &'static str {
 }
 
 fn step_lines(compiled: &Compiled) -> Vec<String> {
-    let is_of_masses = compiled.plan.transport.is_some();
+    let decays = compiled.plan.transport.as_ref().is_some_and(|transport| transport.decay.is_some());
     let words = |stage: Stage| match stage {
-        Stage::React if is_of_masses => {
-            "react: particles become others on their way, each at a time of its own"
-        }
+        Stage::React if decays => "react: particles become others on their way, each at a time of its own",
         _ => stage_words(stage),
     };
     let line = |(stage, cost): &(Stage, f64)| match stage {
