@@ -109,6 +109,13 @@ impl Table {
         }
     }
 
+    /// Whether the table speaks of all coordinates between two, but for the rounding of half a spacing.
+    pub fn speaks_of(&self, axis: usize, low: f64, high: f64) -> bool {
+        let (first, last) = self.extent(axis);
+        let slack = if last.is_finite() { 1e-9 * (last - first) } else { 0.0 };
+        first - slack <= low && high <= last + slack
+    }
+
     /// The value, or a slope, at a place; `beyond` says what there is outside of the rows.
     pub fn look(&self, lookup: Lookup, at: [f64; 3], beyond: Beyond) -> f64 {
         let is_inside = |axis: usize| {

@@ -57,6 +57,15 @@ fn beyond_the_rows_the_edge_holds_or_nothing_is_there() {
     assert_eq!(table.extent(0), (-0.5, 5.5));
 }
 
+/// Rows at the middles of cells speak of the whole domain, although half a spacing is rounded.
+#[test]
+fn middles_of_cells_reach_to_the_sides() {
+    let middles = (0..1000).map(|row| (f64::from(row) + 0.5) * 0.01).collect();
+    let table = Table::new(vec![middles], vec![1.0; 1000], Rule::Linear).expect("a table");
+    assert!(table.speaks_of(0, 0.0, 10.0));
+    assert!(!table.speaks_of(0, -1e-6, 10.0) && !table.speaks_of(0, 0.0, 10.000_001));
+}
+
 #[test]
 fn steps_hold_from_their_row_on() {
     let table = Table::new(vec![vec![0.0, 2.0, 3.0]], vec![5.0, 7.0, 1.0], Rule::Steps).expect("a table");

@@ -302,8 +302,8 @@ impl<'a> Checker<'a> {
             return Some(());
         }
         for (axis, value) in values.iter().filter_map(Expr::value).enumerate() {
-            let (low, high) = table.extent(axis);
-            if !(low..=high).contains(&value) {
+            if !table.speaks_of(axis, value, value) {
+                let (low, high) = table.extent(axis);
                 let column = &statement.columns[axis].name.value;
                 self.report(extent::beyond(column, (value, value), (low, high), span));
                 return None;

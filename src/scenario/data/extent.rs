@@ -103,10 +103,10 @@ fn visit(expr: &Expr, inputs: &Inputs, is_certain: bool, told: &mut Vec<(Diagnos
 
 fn judge(table: &Table, axis: usize, at: &Expr, inputs: &Inputs, is_certain: bool) -> Option<Diagnostic> {
     let found = bounds(at, inputs);
-    let (low, high) = table.extent(axis);
-    if low <= found.low && found.high <= high {
+    if table.speaks_of(axis, found.low, found.high) {
         return None;
     }
+    let (low, high) = table.extent(axis);
     let column = format!("coordinate {} of the table", axis + 1);
     if is_certain && is_exact(at) {
         return Some(beyond(&column, (found.low, found.high), (low, high), at.span));
