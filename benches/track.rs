@@ -78,6 +78,7 @@ fn time<const D: usize, M: Medium<D>>(name: &str, medium: M, high: [f64; D], dt:
         medium,
         ends: walls(high),
         planes: Vec::new(),
+        gaps: Vec::new(),
         drains: Vec::new(),
         interfaces: Vec::new(),
         draws,

@@ -448,6 +448,9 @@ output breakthrough  S    at right flux_weighted at t = 1 d
 output breakthrough  S    at y = 1 m every 1 d resident on 200
 output breakthrough  S in box(5 m .. 10 m, 30 m .. 50 m) every 1 d in mg/L
 output first_passage S every 1 d at x = 2 * w
+output breakthrough  S    at x = 100 m, y = 20 .. 40 m, z = 0 .. 2 m every 1 d
+output breakthrough  S    at right y = 20 .. 40 m every 1 d
+output first_passage S    at well pump every 1 d
 ";
     let (file, problems) = parse(FileId(0), text);
     assert!(problems.is_empty(), "{problems:?}");
@@ -460,9 +463,12 @@ output first_passage S every 1 d at x = 2 * w
         )
         .collect();
     let place = |idx: usize| outputs[idx].place.as_ref().unwrap();
-    assert!(matches!(place(0), Place::Plane(name, _) if name.value == "x"));
-    assert!(matches!(place(1), Place::Side(name) if name.value == "right"));
+    assert!(matches!(place(0), Place::Plane(name, _, part) if name.value == "x" && part.is_empty()));
+    assert!(matches!(place(1), Place::Side(name, part) if name.value == "right" && part.is_empty()));
     assert!(matches!(place(3), Place::Box(_, ranges) if ranges.len() == 2));
+    assert!(matches!(place(5), Place::Plane(_, _, part) if part.len() == 2));
+    assert!(matches!(place(6), Place::Side(_, part) if part.len() == 1));
+    assert!(matches!(place(7), Place::Well(name) if name.value == "pump"));
     let word = |idx: usize| outputs[idx].averaging.as_ref().map(|name| name.value.as_str());
     assert_eq!([word(0), word(1), word(2)], [None, Some("flux_weighted"), Some("resident")]);
     assert_eq!(outputs[3].unit.as_ref().unwrap().value, "mg/L");

@@ -275,6 +275,7 @@ mod tests {
             wall: 4.0,
             cpu: 7.9,
             state_bytes: 16_000_000,
+            flow: None,
         }
     }
 

@@ -123,6 +123,7 @@ pub fn run<const D: usize>(
         wall: clock.wall(),
         cpu: clock.cpu(),
         state_bytes: state_bytes(plan.particles.count, D, run.program.n_columns()),
+        flow: None,
     })
 }
 

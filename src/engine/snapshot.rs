@@ -3,6 +3,7 @@
 //! Owns the shapes of observations. May use `plan` and the counts of `chemistry`. It deliberately knows no Arrow.
 
 use crate::chemistry::Work;
+use crate::flow::statistics::Statistics;
 
 /// One observation of one output at one time.
 #[derive(Debug, Clone, PartialEq)]
@@ -102,6 +103,8 @@ pub struct Outcome {
     pub cpu: f64,
     /// Bytes of particle state.
     pub state_bytes: u64,
+    /// Of a flow in cells.
+    pub flow: Option<Statistics>,
 }
 
 impl Outcome {

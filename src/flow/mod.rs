@@ -13,6 +13,7 @@ pub mod random_field;
 pub mod read;
 pub mod scene;
 pub mod series;
+pub mod statistics;
 pub mod store;
 
 pub use balance::Balance;

@@ -6,13 +6,13 @@
 use super::files::Trouble;
 use super::read::window::Extent;
 use super::store::Flows;
-use crate::diagnostic::codes::{M033, N205};
+use crate::diagnostic::codes::{M005, M033, N205};
 use crate::diagnostic::{Diagnostic, number};
 use crate::plan::build_tape::build_tape;
 use crate::plan::tape::{Operation, Tape};
 use crate::plan::transport::FlowFacts;
-use crate::scenario::Scenario;
 use crate::scenario::transport::{FileFlow, Flow};
+use crate::scenario::{Output, Scenario, Station};
 use crate::source::{Sources, Span};
 
 /// Divergence in a cell, relative to mean discharge over cell size, above which concentrations show it.
@@ -34,9 +34,26 @@ pub fn attach(scenario: &mut Scenario, sources: &Sources, flows: &Flows) -> Vec<
         Err(trouble) => vec![refusal(own, &trouble)],
         Ok(loaded) => {
             own.facts = Some(loaded.facts.clone());
-            warning(&loaded.facts, span).into_iter().collect()
+            let outputs = scenario.outputs.iter().filter_map(|output| unknown_outlet(output, &loaded.facts));
+            warning(&loaded.facts, span).into_iter().chain(outputs).collect()
         }
     }
+}
+
+/// An output at a well that the files do not have.
+fn unknown_outlet(output: &Output, facts: &FlowFacts) -> Option<Diagnostic> {
+    let Some(Station::Well(name)) = &output.station else { return None };
+    if facts.outlets.iter().any(|outlet| outlet.name == *name) {
+        return None;
+    }
+    let names: Vec<String> = facts.outlets.iter().map(|outlet| format!("`{}`", outlet.name)).collect();
+    let expected =
+        if names.is_empty() { "another place: nothing takes water out".to_owned() } else { names.join(", ") };
+    let message = Diagnostic::error(M005, format!("the flow has no `{name}` that takes water out"))
+        .at(output.span, "what leaves with the water of a well is counted")
+        .found(format!("`{name}`"))
+        .expected(expected);
+    Some(message)
 }
 
 fn refusal(flow: &FileFlow, trouble: &Trouble) -> Diagnostic {

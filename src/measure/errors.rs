@@ -20,7 +20,8 @@ pub(super) struct Comparison<'a> {
 
 impl<'a> Comparison<'a> {
     pub(super) fn new(run: &Run, reference: &'a Prepared<'a>, output_idx: usize) -> Result<Self, String> {
-        let series = run.series(output_idx, reference.reference.target)?;
+        let of = reference.reference;
+        let series = run.series_of(output_idx, of.target, of.number)?;
         let expected =
             series.times.iter().map(|observed| reference.bin_means(observed.t, &series.grid)).collect();
         Ok(Self { reference, kind: run.output(output_idx).kind, series, expected })

@@ -7,6 +7,7 @@ use super::grid::{Grid, is_binned};
 use super::observed::{Observed, Run, column};
 use super::reference::Prepared;
 use crate::plan::evaluation::Field;
+use crate::plan::{OutputKind, Quantity};
 
 /// Sums from which all norms follow.
 pub(super) struct Norms {
@@ -141,20 +142,8 @@ fn fill(
             let centres = target.grid.centres(*index).ok_or("the run has no such axis.")?;
             target.times.iter_mut().for_each(|time| time.values.copy_from_slice(&centres));
         }
-        Field::Output(kind, quantity) => {
-            let output_idx = run.find(*kind, *quantity, run.output(on));
-            let output_idx = output_idx.ok_or(
-                "no output of the run has that species or pair on the bins and times of the others.",
-            )?;
-            let series = run.series(output_idx, *quantity)?;
-            if series.times.len() != target.times.len() {
-                return Err("it combines outputs whose times differ.".into());
-            }
-            for (time, observed) in target.times.iter_mut().zip(series.times) {
-                time.values.clone_from(&observed.values);
-                time.mask(&observed);
-            }
-        }
+        Field::Output(kind, quantity) => fill_from(run, (*kind, *quantity, 0), on, target)?,
+        Field::Column(kind, quantity, number) => fill_from(run, (*kind, *quantity, *number), on, target)?,
         Field::Reference(idx) => {
             let reference = references.get(*idx).ok_or("it uses a reference that does not exist.")?;
             for time in &mut target.times {
@@ -166,7 +155,7 @@ fn fill(
             }
             let quantity = reference.reference.target;
             if column(run.output(on), quantity).is_some() {
-                let series = run.series(on, quantity)?;
+                let series = run.series_of(on, quantity, reference.reference.number)?;
                 target.times.iter_mut().zip(&series.times).for_each(|(time, observed)| time.mask(observed));
             }
         }
@@ -181,6 +170,27 @@ fn fill(
             fill(run, references, b, on, &mut other)?;
             target.combine(&other, |a, b| operator.apply(a, b));
         }
+    }
+    Ok(())
+}
+
+/// Replaces the values of `target` by a number of an output.
+fn fill_from(
+    run: &Run,
+    (kind, quantity, number): (OutputKind, Quantity, usize),
+    on: usize,
+    target: &mut Values,
+) -> Result<(), String> {
+    let output_idx = run.find(kind, quantity, run.output(on));
+    let output_idx = output_idx
+        .ok_or("no output of the run has that species or pair on the bins and times of the others.")?;
+    let series = run.series_of(output_idx, quantity, number)?;
+    if series.times.len() != target.times.len() {
+        return Err("it combines outputs whose times differ.".into());
+    }
+    for (time, observed) in target.times.iter_mut().zip(series.times) {
+        time.values.clone_from(&observed.values);
+        time.mask(&observed);
     }
     Ok(())
 }

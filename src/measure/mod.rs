@@ -107,7 +107,7 @@ pub fn fields(
     output_idx: usize,
     quantity: Quantity,
 ) -> Result<Fields, String> {
-    let series = observed::series(plan, snapshots, output_idx, quantity)?;
+    let series = observed::series(plan, snapshots, output_idx, (quantity, 0))?;
     let times = series.times.into_iter();
     let field =
         |time: observed::Observed| FieldAt { t: time.t, values: time.values, is_filled: time.is_filled };

@@ -46,18 +46,28 @@ impl Run<'_> {
         })
     }
 
-    /// The values of a quantity at all times of an output.
+    /// The first number of a quantity at all times of an output.
     pub(super) fn series(&self, output_idx: usize, quantity: Quantity) -> Result<Series, String> {
-        series(self.plan, self.snapshots, output_idx, quantity)
+        self.series_of(output_idx, quantity, 0)
+    }
+
+    /// A number of a quantity at all times of an output.
+    pub(super) fn series_of(
+        &self,
+        output_idx: usize,
+        quantity: Quantity,
+        number: usize,
+    ) -> Result<Series, String> {
+        series(self.plan, self.snapshots, output_idx, (quantity, number))
     }
 }
 
-/// The values of a quantity at all times of an output.
+/// The values of a quantity, or of one of its numbers, at all times of an output.
 pub(super) fn series(
     plan: &Plan,
     snapshots: &[Snapshot],
     output_idx: usize,
-    quantity: Quantity,
+    (quantity, number): (Quantity, usize),
 ) -> Result<Series, String> {
     let output = &plan.outputs[output_idx];
     let column = column(output, quantity).ok_or("the output lacks that species or pair.")?;
@@ -65,7 +75,7 @@ pub(super) fn series(
     let times = snapshots
         .iter()
         .filter(|snapshot| snapshot.output_idx == output_idx)
-        .map(|snapshot| observed(plan, snapshot, column, grid.n_bins()))
+        .map(|snapshot| observed(plan, snapshot, (column, number), grid.n_bins()))
         .collect::<Result<Vec<_>, _>>()?;
     Ok(Series { output_idx, grid, times })
 }
@@ -78,7 +88,12 @@ pub(super) fn column(output: &Output, quantity: Quantity) -> Option<usize> {
     })
 }
 
-fn observed(plan: &Plan, snapshot: &Snapshot, column: usize, n_bins: usize) -> Result<Observed, String> {
+fn observed(
+    plan: &Plan,
+    snapshot: &Snapshot,
+    (column, number): (usize, usize),
+    n_bins: usize,
+) -> Result<Observed, String> {
     let single = |value: Option<f64>| value.map(|value| (vec![value], None, vec![true]));
     // A bin without masses holds none; one without fluid says nothing.
     let least = u64::from(!plan.carries_mass());
@@ -99,9 +114,9 @@ fn observed(plan: &Plan, snapshot: &Snapshot, column: usize, n_bins: usize) -> R
             (vec![state.gamma], None, vec![!(state.gamma.is_nan() && state.m_mean.is_finite())])
         }),
         Values::Particles { .. } => None,
-        // The first number of the only row; it may have no value, as a concentration where no water flows.
+        // A number of the only row; it may have no value, as a concentration where no water flows.
         Values::Rows(rows) => match rows.get(column).map(Vec::as_slice) {
-            Some([row]) => row.numbers.first().map(|&value| (vec![value], None, vec![!value.is_nan()])),
+            Some([row]) => row.numbers.get(number).map(|&value| (vec![value], None, vec![!value.is_nan()])),
             _ => None,
         },
     };

@@ -8,6 +8,7 @@ use super::grid::Grid;
 use super::observed::Run;
 use super::reference::Prepared;
 use crate::engine::snapshot::Outcome;
+use crate::flow::statistics::Statistics;
 use crate::plan::evaluation::{Evaluation, Fact, Field, Measure, Norm, SAME_TIME, Scalar};
 
 /// The values of all measures, in the order of the scene.
@@ -110,6 +111,7 @@ impl Evaluator<'_> {
 }
 
 fn value_of(fact: Fact, outcome: &Outcome) -> f64 {
+    let of_flow = |value: fn(&Statistics) -> f64| outcome.flow.as_ref().map_or(f64::NAN, value);
     match fact {
         Fact::WallTime => outcome.wall,
         Fact::CpuTime => outcome.cpu,
@@ -117,5 +119,12 @@ fn value_of(fact: Fact, outcome: &Outcome) -> f64 {
         Fact::Particles => outcome.n_particles as f64,
         Fact::Steps => outcome.n_steps as f64,
         Fact::SubSteps => outcome.sub_steps().unwrap_or(0) as f64,
+        Fact::VelocityMeanX => of_flow(|flow| flow.mean[0]),
+        Fact::VelocityMeanY => of_flow(|flow| flow.mean[1]),
+        Fact::VelocityMeanZ => of_flow(|flow| flow.mean[2]),
+        Fact::VelocityVarianceX => of_flow(|flow| flow.variance[0]),
+        Fact::VelocityVarianceY => of_flow(|flow| flow.variance[1]),
+        Fact::VelocityVarianceZ => of_flow(|flow| flow.variance[2]),
+        Fact::EffectiveConductivity => of_flow(|flow| flow.conductivity),
     }
 }

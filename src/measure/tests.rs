@@ -46,6 +46,7 @@ fn outcome() -> Outcome {
         wall: 1.5,
         cpu: 2.5,
         state_bytes: 0,
+        flow: None,
     }
 }
 
@@ -62,7 +63,7 @@ fn parabola() -> Tape {
 }
 
 fn reference(name: &str, outputs: &[OutputKind], target: Quantity, solution: Solution) -> Reference {
-    Reference { name: name.into(), outputs: outputs.to_vec(), target, solution }
+    Reference { name: name.into(), outputs: outputs.to_vec(), target, number: 0, solution }
 }
 
 const A: Quantity = Quantity::Species(0);

@@ -5,11 +5,11 @@
 
 use super::shares::{places, speed, spread};
 use super::transport::{Flow, SubSteps, Transport};
-use super::{Axis, Output, Walk};
+use super::{Axis, Output, Plan, Walk};
 use crate::scenario::transport::Auto;
 
 /// Cells that a particle may cross in a step at the mean speed; within, its own sub-steps keep the criteria.
-pub(super) const CELLS_PER_STEP: f64 = 8.0;
+const CELLS_PER_STEP: f64 = 8.0;
 /// Without bins a hundredth of an extent is what criteria count in.
 const PARTS: f64 = 100.0;
 
@@ -37,6 +37,23 @@ pub(super) fn of_masses(
     auto: Auto,
     duration: f64,
 ) -> Chosen {
+    let (limit, n_cells) = longest(axes, outputs, transport, auto);
+    let sub_steps = Some(SubSteps { courant: auto.courant, dispersion: auto.dispersion });
+    let step = whole(n_cells * limit, duration);
+    Chosen { step: fitting(outputs, step, duration).unwrap_or(step), sub_steps }
+}
+
+/// Displacements that a particle takes in a step of its own, at the mean speed of the flow; 1 where there are no cells.
+pub(super) fn displacements(plan: &Plan) -> f64 {
+    let Some(transport) = &plan.transport else { return 1.0 };
+    let Some(SubSteps { courant, dispersion }) = transport.sub_steps else { return 1.0 };
+    let (limit, n_cells) = longest(&plan.axes, &plan.outputs, transport, Auto { courant, dispersion });
+    let expected = plan.time.step / limit;
+    if n_cells > 1.0 && expected.is_finite() { expected.max(1.0) } else { 1.0 }
+}
+
+/// The longest time that the criteria allow at the mean speed, and how many of them make a step.
+fn longest(axes: &[Axis], outputs: &[Output], transport: &Transport, auto: Auto) -> (f64, f64) {
     let of_cells = |cells: &[usize]| {
         let width = |(axis, &cells): (&Axis, &usize)| (axis.high - axis.low) / cells as f64;
         axes.iter().zip(cells).map(width).collect()
@@ -62,10 +79,7 @@ pub(super) fn of_masses(
         Flow::Darcy(_) | Flow::File(_) => vec![speed / (axes.len() as f64).sqrt(); axes.len()],
     };
     let spread = spread(axes, &transport.dispersion, speed);
-    let step = n_cells * limit(&sizes, &velocity, &vec![spread; axes.len()], auto);
-    let sub_steps = Some(SubSteps { courant: auto.courant, dispersion: auto.dispersion });
-    let step = whole(step, duration);
-    Chosen { step: fitting(outputs, step, duration).unwrap_or(step), sub_steps }
+    (limit(&sizes, &velocity, &vec![spread; axes.len()], auto), n_cells)
 }
 
 /// Steps shorter than a given one that are tried.

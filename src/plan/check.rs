@@ -90,8 +90,8 @@ impl Plan {
         }
         let wants_bins = output.kind.has_bins();
         let has_station = output.station.is_some() == output.kind.has_station();
-        let is_right = has_station
-            && output.station.as_ref().is_none_or(|station| station::fits(station, self.axes.len()));
+        let is_right =
+            has_station && output.station.as_ref().is_none_or(|station| station::fits(station, self));
         require(is_right, || format!("an output `{}` is taken at no place", output.kind.word()))?;
         let is_counted = self.transport.is_some() || !output.kind.counts_passages();
         let is_right = is_counted && (self.carries_mass() || !output.kind.needs_masses());

@@ -34,15 +34,15 @@ mod table {
     pub(super) const SPECIATIONS: f64 = 2.0;
     /// Sub-steps of a step if time scales are not known: what is taken at a constant rate runs out somewhere.
     pub(super) const UNKNOWN: f64 = 6.0;
-    /// One displacement of a particle along its track, walls and random numbers included.
+    /// One displacement of a particle along its track, walls and random numbers included: along one axis or by
+    /// expressions, and in cells with two and three axes.
     pub(super) const TRACK: f64 = 15.0;
+    pub(super) const TRACK_CELLS: [f64; 2] = [40.0, 80.0];
     /// One particle asked whether it reacts, and one reaction of it.
     pub(super) const WAIT: f64 = 6.0;
     pub(super) const TURN: f64 = 60.0;
     /// Reactions to and fro that are followed one by one; more are taken together.
     pub(super) const MOST_TURNS: f64 = 120.0;
-    /// Sub-steps that a particle takes in a step of `step auto` in cells.
-    pub(super) const SUB_STEPS: f64 = crate::plan::auto_step::CELLS_PER_STEP;
     /// One particle observed once: positions worked out again, species restored, sums.
     pub(super) const OBSERVE: f64 = 25.0;
     /// One value of a bin observed once: its sums, mean and error.
@@ -62,6 +62,8 @@ pub struct Cost {
     /// sums or the particles of the largest observation.
     pub output_bytes: u64,
     pub particle_steps: f64,
+    /// Displacements that a particle takes in a step, as far as they can be told before a flow is solved for.
+    pub displacements_per_step: f64,
     /// Nanoseconds per particle and step, one entry per stage.
     pub stages: Vec<(Stage, f64)>,
     /// Seconds of one core, observations and their writing included.
@@ -104,7 +106,9 @@ pub fn estimate(plan: &Plan, scales: Option<&TimeScales>) -> Cost {
         Stage::Mix => table::MIX * n_relaxed,
         Stage::React => react_cost,
         Stage::FusedReact => react_cost + table::MIX * n_relaxed,
-        Stage::Move => plan.transport.as_ref().map_or(move_cost * n_axes, track_cost),
+        Stage::Move => {
+            plan.transport.as_ref().map_or(move_cost * n_axes, |transport| track_cost(plan, transport))
+        }
         Stage::Bound => table::BOUND * n_axes,
         Stage::Average => table::AVERAGE * n_values,
         Stage::FusedStep => {
@@ -130,16 +134,21 @@ pub fn estimate(plan: &Plan, scales: Option<&TimeScales>) -> Cost {
         bin_bytes: (8.0 * n_bins * (1.0 + n_values) * 2.0) as u64,
         output_bytes: output_bytes(plan),
         particle_steps,
+        displacements_per_step: super::auto_step::displacements(plan),
         stages,
         cpu_seconds: nanoseconds * 1e-9,
     }
 }
 
 /// Nanoseconds per particle and step of a walk along tracks.
-fn track_cost(transport: &Transport) -> f64 {
+fn track_cost(plan: &Plan, transport: &Transport) -> f64 {
     let in_cells = matches!(transport.flow, Flow::Darcy(_) | Flow::File(_));
-    let n = if in_cells && transport.sub_steps.is_some() { table::SUB_STEPS } else { 1.0 };
-    table::TRACK * n
+    let own = match plan.axes.len() {
+        2 if in_cells => table::TRACK_CELLS[0],
+        3 if in_cells => table::TRACK_CELLS[1],
+        _ => table::TRACK,
+    };
+    own * super::auto_step::displacements(plan)
 }
 
 /// Nanoseconds per particle and step, with the sub-steps that are expected.

@@ -30,6 +30,11 @@ impl Evaluation {
         order(&needs.collect::<Vec<_>>()).items
     }
 
+    /// Whether a measure speaks of the flow in cells.
+    pub fn has_flow(&self) -> bool {
+        self.measures.iter().any(|measure| measure.value.has_flow())
+    }
+
     /// For each measure whether it hangs on the clock: two runs of one plan give other values.
     pub fn is_timed(&self) -> Vec<bool> {
         let mut is_timed = vec![false; self.measures.len()];
@@ -47,6 +52,9 @@ pub struct Reference {
     /// The kinds of output that it is compared with; profile and map for a concentration.
     pub outputs: Vec<OutputKind>,
     pub target: Quantity,
+    /// Which number of a row it predicts.
+    #[serde(default, skip_serializing_if = "is_first")]
+    pub number: usize,
     pub solution: Solution,
 }
 
@@ -57,6 +65,11 @@ pub enum Solution {
     Expression(Tape),
     /// An item of `catalog::reference` with its SI arguments in order.
     Catalogue { name: String, arguments: Vec<f64> },
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref)] // As serde calls it.
+fn is_first(number: &usize) -> bool {
+    *number == 0
 }
 
 /// A named number computed from results and references.
@@ -99,6 +112,15 @@ impl Scalar {
         }
     }
 
+    fn has_flow(&self) -> bool {
+        match self {
+            Self::Fact(fact) => fact.is_of_cells(),
+            Self::Number(_) | Self::Norm(..) | Self::Measure(_) => false,
+            Self::Unary(_, operand) => operand.has_flow(),
+            Self::Binary(_, left, right) => left.has_flow() || right.has_flow(),
+        }
+    }
+
     /// Adds the measures that it names.
     fn measures(&self, list: &mut Vec<usize>) {
         match self {
@@ -122,6 +144,8 @@ pub enum Field {
     Position(usize),
     /// From the output of that kind with the quantity and with the bins and times of the norm's.
     Output(OutputKind, Quantity),
+    /// The same of a number of its rows that is not the first.
+    Column(OutputKind, Quantity, usize),
     /// Index into `Evaluation::references`.
     Reference(usize),
     Unary(Unary, Box<Field>),

@@ -1,7 +1,7 @@
 //! The plan in words: what runs, in which order, what it costs, what was left out and why.
 
 use super::compile::Compiled;
-use super::cost::n_stored_values;
+use super::cost::{Cost, n_stored_values};
 use super::{Normals, Plan, Quantity, Stage, ZoneRate};
 use super::{explain_reactions, explain_transport};
 use crate::diagnostic::number;
@@ -232,11 +232,18 @@ fn place_text(plan: &Plan, output: &super::Output) -> String {
     format!(" at {words} ({})", position.join(", "))
 }
 
+/// With the displacements in each, where particles take steps of their own.
+fn particle_steps(cost: &Cost) -> String {
+    let own = format!("{} particle-steps", number(cost.particle_steps));
+    let n = cost.displacements_per_step;
+    if n > 1.0 { format!("{own} of about {} displacements", number((10.0 * n).round() / 10.0)) } else { own }
+}
+
 fn cost_lines(compiled: &Compiled) -> Vec<String> {
     let cost = &compiled.cost;
     let mib = |bytes: u64| number((bytes as f64 / f64::from(1u32 << 20) * 10.0).round() / 10.0);
     vec![
-        format!("{} particle-steps", number(cost.particle_steps)),
+        particle_steps(cost),
         format!("about {} s on one core", number((cost.cpu_seconds * 100.0).round() / 100.0)),
         format!(
             "{} MiB of particle state, {} MiB of sums over bins, {} MiB of outputs",

@@ -251,11 +251,12 @@ fn evaluation(scenario: &Scenario, problems: &mut Vec<Diagnostic>) -> Evaluation
             },
         };
         let target = match reference.target {
-            scenario::Target::Concentration(a) | scenario::Target::Course(_, a) => Quantity::Species(a),
+            scenario::Target::Concentration(a) | scenario::Target::Course(_, a, _) => Quantity::Species(a),
             scenario::Target::Covariance(a, b) | scenario::Target::Mixing(a, b) => Quantity::Pair(a, b),
         };
         let outputs = reference.target.outputs().to_vec();
-        references.push(evaluation::Reference { name: reference.name.clone(), outputs, target, solution });
+        let (name, number) = (reference.name.clone(), reference.target.number());
+        references.push(evaluation::Reference { name, outputs, target, number, solution });
     }
     let measures = scenario.measures.iter().map(lower_measure).collect();
     Evaluation { references, measures }
@@ -293,12 +294,12 @@ fn lower_field(field: &scenario::Field) -> evaluation::Field {
     match field {
         From::Number(value) => To::Number(*value),
         From::Position(index) => To::Position(*index),
-        From::Output(kind, target) => {
+        From::Output(kind, target, number) => {
             let quantity = match *target {
                 scenario::FieldTarget::Species(a) => Quantity::Species(a),
                 scenario::FieldTarget::Pair(a, b) => Quantity::Pair(a, b),
             };
-            To::Output(*kind, quantity)
+            if *number == 0 { To::Output(*kind, quantity) } else { To::Column(*kind, quantity, *number) }
         }
         From::Reference(idx) => To::Reference(*idx),
         From::Unary(operator, a) => To::Unary(*operator, Box::new(lower_field(a))),

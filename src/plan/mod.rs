@@ -208,6 +208,19 @@ impl Plan {
         self.transport.is_some() || self.walk.drift.iter().chain(&self.walk.spread).any(|entry| *entry != 0.0)
     }
 
+    /// The plan with another root of its random numbers: a random field that has no seed of its own follows it.
+    pub fn with_seed(&self, seed: u64) -> Self {
+        let mut plan = self.clone();
+        plan.seed = seed;
+        if let Some(transport::Flow::Darcy(darcy)) = plan.transport.as_mut().map(|own| &mut own.flow)
+            && let transport::Conductivity::Lognormal { seed: field, .. } = &mut darcy.conductivity
+            && *field == self.seed
+        {
+            *field = seed;
+        }
+        plan
+    }
+
     /// Sets the number of particles; each then stands for as much more or less.
     pub fn set_count(&mut self, count: u64) {
         let before = self.particles.count;

@@ -1,122 +1,13 @@
-//! The numbers that outputs in rows have, and the words of their places.
+//! The words of the places of rows, and where they are.
 //!
-//! Owns the words of rows and the meaning of their numbers. May use the plan's types and
-//! dimensions. It deliberately counts nothing: the engine does.
+//! Owns these words. May use the plan's types. It deliberately counts nothing: the engine does.
 
+use super::transport::{Flow, Outlet};
 use super::{Output, OutputKind, Plan, Station};
-use crate::units::Dimension;
 
-/// What a number is measured in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Rule {
-    /// The unit of the output, as its first number.
-    Value,
-    /// SI amount: mol or kg, per m² or m with fewer axes.
-    Amount,
-    /// The same per s.
-    Rate,
-    /// A power of m.
-    Length(i8),
-    Ratio,
-    Count,
-}
-
-/// A number of a row.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Number {
-    pub name: &'static str,
-    pub rule: Rule,
-    pub doc: &'static str,
-}
-
-const fn number(name: &'static str, rule: Rule, doc: &'static str) -> Number {
-    Number { name, rule, doc }
-}
-
-const BREAKTHROUGH: &[Number] = &[
-    number(
-        "concentration",
-        Rule::Value,
-        "through a plane or a side: net mass over water, both since the time before; in a box: mean concentration of its water; null without water or time",
-    ),
-    number("rate", Rule::Rate, "net mass per time since the time before; null in a box"),
-    number("cumulative", Rule::Amount, "net mass since the start; null in a box"),
-    number(
-        "n_particles",
-        Rule::Count,
-        "passages since the time before, forwards and backwards; in a box the particles there",
-    ),
-];
-
-const FIRST_PASSAGE: &[Number] = &[
-    number("cumulative", Rule::Value, "mass of the particles that have touched the place, each once"),
-    number("rate", Rule::Rate, "the same per time since the time before; null at the start"),
-    number(
-        "n_particles",
-        Rule::Count,
-        "particles that touched the place for the first time since the time before",
-    ),
-];
-
-const MOMENTS: &[Number] = &[
-    number("amount", Rule::Value, "amount that is there, outside of open sides included"),
-    number("mean_x", Rule::Length(1), "centre of the amount; null without amount or axis"),
-    number("mean_y", Rule::Length(1), "centre of the amount; null without amount or axis"),
-    number("mean_z", Rule::Length(1), "centre of the amount; null without amount or axis"),
-    number("xx", Rule::Length(2), "second central moment; null without amount or axis"),
-    number("yy", Rule::Length(2), "second central moment; null without amount or axis"),
-    number("zz", Rule::Length(2), "second central moment; null without amount or axis"),
-    number("xy", Rule::Length(2), "second central moment; null without amount or axis"),
-    number("xz", Rule::Length(2), "second central moment; null without amount or axis"),
-    number("yz", Rule::Length(2), "second central moment; null without amount or axis"),
-];
-
-const DILUTION: &[Number] = &[
-    number(
-        "index",
-        Rule::Value,
-        "exp(-sum p ln(p/V)) over bins of volume V that hold the share p of the amount; m^d over d axes",
-    ),
-    number("entropy", Rule::Ratio, "-sum p ln p over the bins"),
-    number("reactor_ratio", Rule::Ratio, "index over the volume of the domain"),
-];
-
-const BUDGET: &[Number] = &[
-    number(
-        "amount",
-        Rule::Value,
-        "entered less left; what is there in row `inside`; in row `defect` that less all others",
-    ),
-    number(
-        "entered",
-        Rule::Value,
-        "what came in, or was made by a reaction, since the start; null in rows `inside` and `defect`",
-    ),
-    number(
-        "left",
-        Rule::Value,
-        "what went out, or was taken by a reaction, since the start; null in rows `inside` and `defect`",
-    ),
-];
+pub use crate::scenario::numbers::{Number, Rule, number_dimension};
 
 impl OutputKind {
-    /// The numbers of a row, the first of which measures and figures speak of; none where there are no rows.
-    pub fn numbers(self) -> &'static [Number] {
-        match self {
-            OutputKind::Breakthrough => BREAKTHROUGH,
-            OutputKind::FirstPassage => FIRST_PASSAGE,
-            OutputKind::Moments => MOMENTS,
-            OutputKind::Dilution => DILUTION,
-            OutputKind::Budget => BUDGET,
-            OutputKind::Profile
-            | OutputKind::Covariance
-            | OutputKind::Map
-            | OutputKind::Total
-            | OutputKind::Mixing
-            | OutputKind::Particles => &[],
-        }
-    }
-
     /// Whether rows of one time are told apart by a word.
     pub fn has_places(self) -> bool {
         self.has_station() || self == OutputKind::Budget
@@ -172,51 +63,70 @@ impl Plan {
                 places.extend([INSIDE.to_owned(), DEFECT.to_owned()]);
                 places
             }
-            (_, Some(Station::Plane { .. })) => vec!["plane".to_owned()],
-            (_, Some(Station::Side(side))) => vec![self.side_name(*side).to_owned()],
-            (_, Some(Station::Box { .. })) => vec!["box".to_owned()],
+            (_, Some(station)) => vec![self.place(station)],
             (_, None) => Vec::new(),
         }
     }
 
-    /// Where a station is along the axes of the scene: its plane, its side, the centre of its box.
+    fn place(&self, station: &Station) -> String {
+        match station {
+            Station::Plane { .. } => "plane".to_owned(),
+            Station::Side(side) => self.side_name(*side).to_owned(),
+            Station::Box { .. } => "box".to_owned(),
+            Station::Well(name) => name.clone(),
+            Station::Part { of, .. } => format!("part of {}", self.place(of)),
+        }
+    }
+
+    /// Where a station is along the axes of the scene: its plane, its side, the centre of its box or part, its well.
     pub fn position(&self, station: &Station) -> [Option<f64>; 3] {
         let mut position = [None; 3];
-        for (axis_idx, axis) in self.axes.iter().enumerate() {
-            let at = match station {
-                Station::Plane { axis, at } => (*axis == axis_idx).then_some(*at),
-                Station::Side(side) if side / 2 == axis_idx => {
-                    Some(if side % 2 == 0 { axis.low } else { axis.high })
-                }
-                Station::Side(_) => None,
-                Station::Box { low, high } => Some(0.5 * (low[axis_idx] + high[axis_idx])),
-            };
-            if axis.index < 3 {
-                position[axis.index] = at;
-            }
+        for (axis_idx, axis) in self.axes.iter().enumerate().filter(|(_, axis)| axis.index < 3) {
+            position[axis.index] = self.along(station, axis_idx);
         }
         position
     }
+
+    fn along(&self, station: &Station, axis_idx: usize) -> Option<f64> {
+        let axis = &self.axes[axis_idx];
+        match station {
+            Station::Plane { axis, at } => (*axis == axis_idx).then_some(*at),
+            Station::Side(side) if side / 2 == axis_idx => {
+                Some(if side % 2 == 0 { axis.low } else { axis.high })
+            }
+            Station::Side(_) => None,
+            Station::Box { low, high } => Some(0.5 * (low[axis_idx] + high[axis_idx])),
+            Station::Part { of, low, high } => {
+                self.along(of, axis_idx).or(Some(0.5 * (low[axis_idx] + high[axis_idx])))
+            }
+            Station::Well(name) => {
+                let Flow::Darcy(flow) = &self.transport.as_ref()?.flow else { return None };
+                let well = flow.wells.iter().find(|well| well.name == *name)?;
+                Some(0.5 * (well.low[axis_idx] + well.high[axis_idx]))
+            }
+        }
+    }
+
+    /// A well or package that takes water out, with its number among these.
+    pub fn outlet(&self, name: &str) -> Option<(usize, Outlet)> {
+        let outlets = self.transport.as_ref()?.outlets();
+        outlets.into_iter().enumerate().find(|(_, outlet)| outlet.name == name)
+    }
 }
 
-/// Whether a station fits so many axes.
-pub(super) fn fits(station: &Station, n_axes: usize) -> bool {
+/// Whether a plan has such a station.
+pub(super) fn fits(station: &Station, plan: &Plan) -> bool {
+    let n_axes = plan.axes.len();
     match station {
         Station::Plane { axis, at } => *axis < n_axes && at.is_finite(),
         Station::Side(side) => *side < 2 * n_axes,
         Station::Box { low, high } => {
             low.len() == n_axes && high.len() == n_axes && low.iter().zip(high).all(|(low, high)| low < high)
         }
-    }
-}
-
-/// Dimension of a number of an output whose first one has dimension `value`, for amounts of dimension `amount`.
-pub fn number_dimension(rule: Rule, value: Dimension, amount: Dimension) -> Dimension {
-    match rule {
-        Rule::Value => value,
-        Rule::Amount => amount,
-        Rule::Rate => amount.over(Dimension::TIME),
-        Rule::Length(power) => Dimension::new(i16::from(power), 0, 0, 0),
-        Rule::Ratio | Rule::Count => Dimension::NONE,
+        Station::Well(name) => plan.outlet(name).is_some(),
+        Station::Part { of, low, high } => {
+            let whole = Station::Box { low: low.clone(), high: high.clone() };
+            matches!(**of, Station::Plane { .. } | Station::Side(_)) && fits(of, plan) && fits(&whole, plan)
+        }
     }
 }

@@ -75,6 +75,11 @@ pub fn value(plan: &Plan, output: &Output, quantity: Quantity, n_axes: usize, la
     }
 }
 
+/// For values up to `largest` of a table's unit; masses per volume get short, all others stay as they are.
+pub fn of_unit(unit: &str, largest: f64) -> Shown {
+    if unit == "kg/m^3" { step(MASSES, largest) } else { Shown::new(1.0, &raised(unit)) }
+}
+
 fn squared(dimension: Dimension, largest: f64) -> Shown {
     let is_square_of = |base: Dimension| dimension.0 == base.0.map(|exponent| 2 * exponent);
     let root = largest.sqrt();

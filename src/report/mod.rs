@@ -13,6 +13,7 @@ mod display;
 mod errors;
 mod figure;
 mod heat;
+mod moments;
 mod notes;
 mod page;
 mod panel;

@@ -102,6 +102,8 @@ impl Frame {
 
 pub const SMALL: f64 = 11.0;
 const MIDDLE: f64 = 12.0;
+/// Part of a panel that a map to scale has to fill.
+const NARROWEST: f64 = 0.25;
 
 /// Letters in the ink of axes.
 pub fn lettering(size: f64, horizontal: HPos, vertical: VPos) -> Lettering {
@@ -118,6 +120,7 @@ pub fn draw(canvas: &mut Canvas, panel: &Panel, outer: Frame) {
         right: outer.right - 14.0 - color_bar,
         bottom: outer.bottom - 44.0,
     };
+    let inner = if panel.heat.is_some() { to_scale(panel, inner) } else { inner };
     let title = Lettering { size: 13.0, ..lettering(13.0, HPos::Left, VPos::Bottom) };
     canvas.letters(&panel.title, (inner.left, inner.top - 4.0), title);
     let ticks = Ticks { x: x_ticks(panel, inner), y: y_ticks };
@@ -132,6 +135,18 @@ pub fn draw(canvas: &mut Canvas, panel: &Panel, outer: Frame) {
     labels(canvas, panel, inner, outer);
     notes::draw(canvas, panel, inner);
     key(canvas, panel, inner);
+}
+
+/// The part of a frame in which a metre of either axis has one length; all of it for a map that would be a stripe.
+fn to_scale(panel: &Panel, frame: Frame) -> Frame {
+    let (width, height) = (frame.right - frame.left, frame.bottom - frame.top);
+    let (x, y) = (panel.x.high - panel.x.low, panel.y.high - panel.y.low);
+    let unit = (width / x).min(height / y);
+    let (wide, high) = (unit * x, unit * y);
+    if !unit.is_finite() || wide < NARROWEST * width || high < NARROWEST * height {
+        return frame;
+    }
+    Frame { right: frame.left + wide, bottom: frame.top + high, ..frame }
 }
 
 /// Room for the axis label and the widest text of the ticks; the same in all panels unless one needs more.
@@ -261,14 +276,14 @@ fn labels(canvas: &mut Canvas, panel: &Panel, inner: Frame, outer: Frame) {
     canvas.letters(&panel.y_label, (outer.left + shift, middle.1), beside);
 }
 
-/// In the corner of the panel that holds the fewest points.
+/// Where the panel holds the fewest points.
 fn key(canvas: &mut Canvas, panel: &Panel, frame: Frame) {
     if panel.key.is_empty() {
         return;
     }
     let width = panel.key.iter().map(|entry| text_width(&entry.text, SMALL)).fold(0.0, f64::max) + 36.0;
     let height = 16.0 * panel.key.len() as f64 + 6.0;
-    let (left, top) = emptiest_corner(panel, frame, width, height);
+    let (left, top) = emptiest_place(panel, frame, width, height);
     let paper = Pen { opacity: 0.85, ..Pen::new(WHITE, 0.0) };
     canvas.rectangle((left, top), (left + width, top + height), paper);
     for (row, entry) in panel.key.iter().enumerate() {
@@ -276,20 +291,22 @@ fn key(canvas: &mut Canvas, panel: &Panel, frame: Frame) {
     }
 }
 
-fn emptiest_corner(panel: &Panel, frame: Frame, width: f64, height: f64) -> (f64, f64) {
+/// A corner, or a place between the corners if all of these cover points.
+fn emptiest_place(panel: &Panel, frame: Frame, width: f64, height: f64) -> (f64, f64) {
     let (left, right) = (frame.left + 5.0, frame.right - width - 5.0);
     let (top, bottom) = (frame.top + 5.0, frame.bottom - height - 5.0);
     let n_inside = |corner: (f64, f64)| {
         let points = panel.marks.iter().flat_map(|mark| &mark.points);
         let places = points.map(|point| frame.place(&panel.x, &panel.y, *point));
-        places
-            .filter(|(x, y)| {
-                (corner.0..corner.0 + width).contains(x) && (corner.1..corner.1 + height).contains(y)
-            })
-            .count()
+        // A dot reaches over its place.
+        let (across, along) =
+            (corner.0 - 3.0..corner.0 + width + 3.0, corner.1 - 3.0..corner.1 + height + 3.0);
+        places.filter(|(x, y)| across.contains(x) && along.contains(y)).count()
     };
-    let corners = [(right, top), (left, top), (right, bottom), (left, bottom)];
-    corners.into_iter().min_by_key(|corner| n_inside(*corner)).unwrap_or(corners[0])
+    let mut candidates = vec![(right, top), (left, top), (right, bottom), (left, bottom)];
+    let between = |low: f64, high: f64, k: u32| low + (high - low) * f64::from(k) / 8.0;
+    candidates.extend((0..81).map(|k| (between(left, right, k % 9), between(top, bottom, k / 9))));
+    candidates.into_iter().min_by_key(|corner| n_inside(*corner)).unwrap_or((right, top))
 }
 
 /// A sample and its text, `at` the middle of its left edge. Returns the width it takes.

@@ -6,11 +6,12 @@
 use super::color::{BLACK, FAINT, Rgb, SERIES, blend};
 use super::display::{self, Shown, plain};
 use super::heat::Heat;
+use super::moments;
 use super::panel::{KeyEntry, Look, Mark, Panel};
 use super::scale::{Scale, Spacing};
 use crate::engine::snapshot::{Snapshot, Values, counts};
 use crate::measure::Curve;
-use crate::plan::{Output, OutputKind, Plan, Quantity};
+use crate::plan::{Output, OutputKind, Plan, Quantity, Station};
 use crate::table::{Grid, value_dimension};
 use crate::units::Dimension;
 
@@ -70,6 +71,12 @@ impl<'a> Story<'a> {
                     panels.extend(quantities().filter_map(|(q, _)| self.budget(output_idx, output, q)));
                 }
                 OutputKind::Particles => {}
+                OutputKind::Moments if self.curves.iter().all(|curve| curve.output_idx != output_idx) => {
+                    let time = (self.time_unit.factor, &self.time_unit.text[..]);
+                    panels.extend(quantities().flat_map(|(q, quantity)| {
+                        moments::panels(self.of_output(output_idx), q, &self.names(quantity), time)
+                    }));
+                }
                 _ => panels.extend(self.courses(output_idx, output)),
             }
         }
@@ -111,7 +118,7 @@ impl<'a> Story<'a> {
         Look::Line(PATTERNS[idx % PATTERNS.len()])
     }
 
-    fn of_output(&self, output_idx: usize) -> impl Iterator<Item = &'a Snapshot> + use<'a> {
+    fn of_output(&self, output_idx: usize) -> impl Iterator<Item = &'a Snapshot> + Clone + use<'a> {
         self.snapshots.iter().filter(move |snapshot| snapshot.output_idx == output_idx)
     }
 
@@ -237,6 +244,9 @@ impl<'a> Story<'a> {
     /// Where a course is taken.
     fn station(&self, output: &Output) -> String {
         let Some(station) = &output.station else { return String::new() };
+        if let Station::Well(name) = station {
+            return format!(" at {name}");
+        }
         let position = self.plan.position(station);
         let known = AXES.iter().zip(position).filter_map(|(name, at)| Some((name, at?)));
         let text: Vec<String> =

@@ -115,6 +115,10 @@ pub enum Station {
     Side(usize),
     /// What is in a box: limits per active axis, m.
     Box { low: Vec<f64>, high: Vec<f64> },
+    /// What a well takes out, by its name.
+    Well(String),
+    /// A part of a plane or a side: limits per active axis, m; along that of the plane they say nothing.
+    Part { of: std::boxed::Box<Station>, low: Vec<f64>, high: Vec<f64> },
 }
 
 /// What is observed.

@@ -51,6 +51,36 @@ pub enum Fact {
     Steps,
     /// Accepted sub-steps of what is integrated, all particles together.
     SubSteps,
+    /// Mean velocity of the water along an axis, of a flow in cells.
+    VelocityMeanX,
+    VelocityMeanY,
+    VelocityMeanZ,
+    VelocityVarianceX,
+    VelocityVarianceY,
+    VelocityVarianceZ,
+    /// Of a Darcy flow between two heads.
+    EffectiveConductivity,
+}
+
+impl Fact {
+    /// Whether it is one of a flow in cells.
+    pub fn is_of_cells(self) -> bool {
+        match self {
+            Self::WallTime
+            | Self::CpuTime
+            | Self::MassDefect
+            | Self::Particles
+            | Self::Steps
+            | Self::SubSteps => false,
+            Self::VelocityMeanX
+            | Self::VelocityMeanY
+            | Self::VelocityMeanZ
+            | Self::VelocityVarianceX
+            | Self::VelocityVarianceY
+            | Self::VelocityVarianceZ
+            | Self::EffectiveConductivity => true,
+        }
+    }
 }
 
 /// From a field (bins × times, or times) to a number. Sums over space are integrals with the bin
@@ -80,7 +110,8 @@ pub enum Field {
     Number(f64),
     /// Centre of the bin along axis 0, 1, 2 for x, y, z.
     Position(usize),
-    Output(OutputKind, FieldTarget),
+    /// With which of its numbers, the first being 0.
+    Output(OutputKind, FieldTarget, usize),
     Reference(usize),
     Unary(Unary, Box<Field>),
     Binary(Binary, Box<Field>, Box<Field>),
@@ -111,7 +142,10 @@ pub(super) fn measures<'a>(
         decided: Vec::new(),
     };
     let mut found: Vec<Option<Measure>> = vec![None; statements.measures.len()];
-    checker.measuring = Some(Measuring::new(results, found.len()));
+    let has_cells = statements.flow.is_some_and(|(_, flow)| {
+        matches!(flow.argument, tree::FlowArgument::Entries(_) | tree::FlowArgument::Files(..))
+    });
+    checker.measuring = Some(Measuring::new(results, found.len(), has_cells));
     for idx in order_of_measures(checker, statements) {
         let (span, written) = statements.measures[idx];
         found[idx] = measure(checker, span, written, duration, domain);

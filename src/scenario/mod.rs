@@ -17,6 +17,7 @@ mod fields;
 mod geometry;
 mod measure;
 mod model;
+pub mod numbers;
 mod observe;
 mod places;
 mod point;
@@ -298,8 +299,8 @@ pub enum Target {
     Concentration(usize),
     Covariance(usize, usize),
     Mixing(usize, usize),
-    /// One number over time: a total, a breakthrough, …
-    Course(OutputKind, usize),
+    /// One number over time: a total, a breakthrough, …; of an output in rows which of its numbers.
+    Course(OutputKind, usize, usize),
 }
 
 #[derive(Debug, Clone, PartialEq)]

@@ -3,7 +3,9 @@
 use super::check::{Allow, Checker};
 use super::collect::Statements;
 use super::model::species_index;
+use super::numbers::number_dimension;
 use super::observe::OUTPUTS;
+use super::results::number_named;
 use super::scope::Origin;
 use super::{Output, OutputKind, Reference, Solution, Target};
 use crate::catalog::reference::{self as catalogue, ArgumentDimension, Item, Predicts};
@@ -29,7 +31,7 @@ impl Target {
             Target::Concentration(_) => &[OutputKind::Profile, OutputKind::Map],
             Target::Covariance(..) => &[OutputKind::Covariance],
             Target::Mixing(..) => &[OutputKind::Mixing],
-            Target::Course(kind, _) => match kind {
+            Target::Course(kind, ..) => match kind {
                 OutputKind::Breakthrough => &[OutputKind::Breakthrough],
                 OutputKind::FirstPassage => &[OutputKind::FirstPassage],
                 OutputKind::Moments => &[OutputKind::Moments],
@@ -42,7 +44,7 @@ impl Target {
     pub(super) fn is_in(self, output: &Output) -> bool {
         self.outputs().contains(&output.kind)
             && match self {
-                Target::Concentration(species) | Target::Course(_, species) => {
+                Target::Concentration(species) | Target::Course(_, species, _) => {
                     output.species.contains(&species)
                 }
                 Target::Covariance(a, b) | Target::Mixing(a, b) => {
@@ -51,10 +53,15 @@ impl Target {
             }
     }
 
+    /// Which number of its output it predicts, the first being 0.
+    pub fn number(self) -> usize {
+        if let Target::Course(.., number) = self { number } else { 0 }
+    }
+
     pub(super) fn species(self) -> usize {
         match self {
             Target::Concentration(a)
-            | Target::Course(_, a)
+            | Target::Course(_, a, _)
             | Target::Covariance(a, _)
             | Target::Mixing(a, _) => a,
         }
@@ -122,8 +129,18 @@ fn target(checker: &mut Checker<'_>, written: &tree::Target, span: Span) -> Opti
             Some(checker.word(name, "an output that a reference can predict", &words)?)
         }
     };
-    let species: Vec<Option<usize>> =
-        written.species.iter().map(|name| species_index(checker, name)).collect();
+    let mut number = 0;
+    let species: Vec<Option<usize>> = written
+        .species
+        .iter()
+        .map(|name| match (kind, split_number(checker, name)) {
+            (Some(kind), Some((before, last))) if !kind.numbers().is_empty() => {
+                number = number_named(checker, kind, &last)?;
+                species_index(checker, &before)
+            }
+            _ => species_index(checker, name),
+        })
+        .collect();
     let species: Vec<usize> = species.into_iter().collect::<Option<_>>()?;
     let target = match (kind, species.as_slice()) {
         (None | Some(OutputKind::Profile | OutputKind::Map), [a]) => Some(Target::Concentration(*a)),
@@ -131,7 +148,7 @@ fn target(checker: &mut Checker<'_>, written: &tree::Target, span: Span) -> Opti
         (Some(OutputKind::Covariance), [a, b]) => Some(Target::Covariance(*a, *b)),
         (Some(OutputKind::Mixing), [a]) => Some(Target::Mixing(*a, *a)),
         (Some(OutputKind::Mixing), [a, b]) => Some(Target::Mixing(*a, *b)),
-        (Some(kind), [a]) if kind.is_course() => Some(Target::Course(kind, *a)),
+        (Some(kind), [a]) if kind.is_course() => Some(Target::Course(kind, *a, number)),
         _ => None,
     };
     if target.is_none() {
@@ -147,6 +164,18 @@ fn target(checker: &mut Checker<'_>, written: &tree::Target, span: Span) -> Opti
         );
     }
     target
+}
+
+/// `A.xx` as the species and the number; nothing for the name of a species.
+fn split_number(checker: &Checker<'_>, name: &tree::Name) -> Option<(tree::Name, tree::Name)> {
+    let (before, last) = name.value.rsplit_once('.')?;
+    if checker.scope.get(&name.value).is_some() {
+        return None;
+    }
+    let split = name.span.start as usize + before.len();
+    let place = |start: usize, end: usize| Span::new(name.span.file, start, end);
+    let before = tree::Name::new(before.to_owned(), place(name.span.start as usize, split));
+    Some((before, tree::Name::new(last.to_owned(), place(split + 1, name.span.end as usize))))
 }
 
 fn solution<'a>(
@@ -173,10 +202,15 @@ fn solution<'a>(
     let expr = checker.check(&written.value, Allow::REFERENCE)?;
     let target = target?;
     let concentration = checker.concentration_of(target.species())?;
-    let expected = match target {
+    let n_axes = checker.axes.len();
+    let kind = target.outputs()[0];
+    let first = match target {
         Target::Mixing(..) => Dimension::NONE,
-        other => other.outputs()[0].dimension(concentration, checker.axes.len()),
+        _ => kind.dimension(concentration, n_axes),
     };
+    let amount = OutputKind::Total.dimension(concentration, n_axes);
+    let number = kind.numbers().get(target.number());
+    let expected = number.map_or(first, |number| number_dimension(number.rule, first, amount));
     checker.expect_dimension(&written.value, &expr, "the reference", &[expected])?;
     Some(Solution::Expression(expr))
 }
@@ -343,7 +377,12 @@ fn check_prediction(
         Predicts::Concentration => (matches!(target, Target::Concentration(_)), "a concentration"),
         Predicts::Covariance => (matches!(target, Target::Covariance(..)), "a covariance"),
         Predicts::Gamma => (matches!(target, Target::Mixing(..)), "a mixing ratio γ"),
-        Predicts::Total => (matches!(target, Target::Course(OutputKind::Total, _)), "a total"),
+        Predicts::Total => (matches!(target, Target::Course(OutputKind::Total, ..)), "a total"),
+        Predicts::Moment => {
+            let name = target.outputs()[0].numbers().get(target.number()).map_or("", |number| number.name);
+            let is_moment = matches!(target, Target::Course(OutputKind::Moments, ..));
+            (is_moment && ["xx", "yy", "zz"].contains(&name), "a second moment")
+        }
     };
     if fits {
         return Some(());
@@ -358,6 +397,7 @@ fn check_prediction(
                 Predicts::Covariance => "`for covariance A, B`",
                 Predicts::Gamma => "`for mixing A, B`",
                 Predicts::Total => "`for total SPECIES`",
+                Predicts::Moment => "`for moments SPECIES.xx`, `.yy` or `.zz`",
             }),
     );
     None

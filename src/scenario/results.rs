@@ -9,6 +9,7 @@ use super::expression::{Expr, Node};
 use super::fields::{self, Part};
 use super::measure::{Fact, Field, FieldTarget, Norm, Scalar};
 use super::model::species_index;
+use super::numbers::number_dimension;
 use super::observe::OUTPUTS;
 use super::places::{Places, Results, place_of};
 use super::scope::{Origin, THE_REFERENCE};
@@ -19,6 +20,8 @@ use crate::syntax::tree;
 use crate::units::Dimension;
 use std::rc::Rc;
 
+const SQUARED_VELOCITY: Dimension = Dimension::new(2, 0, -2, 0);
+
 const FACTS: &[(&str, Fact, Dimension)] = &[
     ("wall_time", Fact::WallTime, Dimension::TIME),
     ("cpu_time", Fact::CpuTime, Dimension::TIME),
@@ -26,6 +29,13 @@ const FACTS: &[(&str, Fact, Dimension)] = &[
     ("particles", Fact::Particles, Dimension::NONE),
     ("steps", Fact::Steps, Dimension::NONE),
     ("sub_steps", Fact::SubSteps, Dimension::NONE),
+    ("velocity_mean_x", Fact::VelocityMeanX, Dimension::VELOCITY),
+    ("velocity_mean_y", Fact::VelocityMeanY, Dimension::VELOCITY),
+    ("velocity_mean_z", Fact::VelocityMeanZ, Dimension::VELOCITY),
+    ("velocity_variance_x", Fact::VelocityVarianceX, SQUARED_VELOCITY),
+    ("velocity_variance_y", Fact::VelocityVarianceY, SQUARED_VELOCITY),
+    ("velocity_variance_z", Fact::VelocityVarianceZ, SQUARED_VELOCITY),
+    ("effective_conductivity", Fact::EffectiveConductivity, Dimension::VELOCITY),
 ];
 
 const NORMS: &[(&str, Norm)] = &[
@@ -48,12 +58,14 @@ pub(super) struct Measuring {
     pub leaves: Vec<Part>,
     /// Whether norms that leave no choice of their output are being gathered.
     is_deciding: bool,
+    /// Whether the flow of the scene is one in cells.
+    has_cells: bool,
 }
 
 impl Measuring {
-    pub(super) fn new(results: Results, n_measures: usize) -> Self {
+    pub(super) fn new(results: Results, n_measures: usize, has_cells: bool) -> Self {
         let dimensions = vec![None; n_measures];
-        Self { results: Rc::new(results), dimensions, leaves: Vec::new(), is_deciding: false }
+        Self { results: Rc::new(results), dimensions, leaves: Vec::new(), is_deciding: false, has_cells }
     }
 
     /// Another measure, restricted to these times.
@@ -84,6 +96,10 @@ impl<'a> Checker<'a> {
         match origin {
             None => {
                 if let Some((_, fact, dimension)) = FACTS.iter().find(|(word, ..)| *word == text) {
+                    if fact.is_of_cells() && !self.measuring.as_ref()?.has_cells {
+                        report_no_cells(self, name);
+                        return Some(None);
+                    }
                     return Some(self.result(Part::Scalar(Scalar::Fact(*fact)), *dimension, 1, span));
                 }
                 if text == THE_REFERENCE && reference.is_none() {
@@ -117,6 +133,7 @@ impl<'a> Checker<'a> {
     pub(super) fn result_of_output(&mut self, path: &'a [tree::Name], span: Span) -> Option<Expr> {
         let results = Rc::clone(&self.measuring.as_ref()?.results);
         let kind = self.word(&path[0], "an output", OUTPUTS)?;
+        let (path, number) = self.number_of(kind, path)?;
         let species: Vec<Option<usize>> = path[1..].iter().map(|name| species_index(self, name)).collect();
         let species: Vec<usize> = species.into_iter().collect::<Option<_>>()?;
         let target = FieldTarget::of(kind, &species);
@@ -140,8 +157,25 @@ impl<'a> Checker<'a> {
             }
             other => other,
         };
-        let dimension = self.dimension_of(kind, *species.first()?)?;
-        self.result(Part::Field(Field::Output(kind, target), places), dimension, 1, span)
+        let dimension = self.dimension_of_number(kind, *species.first()?, number)?;
+        self.result(Part::Field(Field::Output(kind, target, number), places), dimension, 1, span)
+    }
+
+    /// Takes the name of a number off a path such as `moments.A.xx`; without one it is the first number.
+    fn number_of(&mut self, kind: OutputKind, path: &'a [tree::Name]) -> Option<(&'a [tree::Name], usize)> {
+        match path {
+            [before @ .., last] if before.len() == 2 && !kind.numbers().is_empty() => {
+                Some((before, number_named(self, kind, last)?))
+            }
+            _ => Some((path, 0)),
+        }
+    }
+
+    fn dimension_of_number(&self, kind: OutputKind, species: usize, number: usize) -> Option<Dimension> {
+        let first = self.dimension_of(kind, species)?;
+        let Some(of) = kind.numbers().get(number) else { return Some(first) };
+        let amount = OutputKind::Total.dimension(self.concentration_of(species)?, self.axes.len());
+        Some(number_dimension(of.rule, first, amount))
     }
 
     fn result_of_reference(&mut self, idx: usize, span: Span) -> Option<Expr> {
@@ -165,7 +199,8 @@ impl<'a> Checker<'a> {
             );
             return None;
         }
-        let dimension = self.dimension_of(outputs[0], reference.target.species())?;
+        let number = reference.target.number();
+        let dimension = self.dimension_of_number(outputs[0], reference.target.species(), number)?;
         self.result(Part::Field(Field::Reference(idx), places), dimension, 1, span)
     }
 
@@ -222,6 +257,22 @@ impl<'a> Checker<'a> {
         }
         chosen.first().copied()
     }
+}
+
+/// The number of an output in rows that has a name.
+pub(super) fn number_named(checker: &mut Checker<'_>, kind: OutputKind, name: &tree::Name) -> Option<usize> {
+    let numbers = kind.numbers().iter().enumerate();
+    let words: Vec<(&str, usize)> = numbers.map(|(idx, number)| (number.name, idx)).collect();
+    checker.word(name, &format!("a number of `{}`", kind.word()), &words)
+}
+
+fn report_no_cells(checker: &mut Checker<'_>, name: &tree::Name) {
+    checker.report(
+        Diagnostic::error(M015, format!("`{}` is known of a flow in cells only", name.value))
+            .at(name.span, "no such flow here")
+            .found("a flow without cells")
+            .expected("`flow darcy { … }`, or a flow from a file"),
+    );
 }
 
 fn report_no_only_reference(checker: &mut Checker<'_>, span: Span) {

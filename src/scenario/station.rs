@@ -1,14 +1,14 @@
 //! Where breakthroughs and first passages are taken.
 //!
-//! Owns the checks of `at x = …`, `at right`, `in box(…)` and of the way concentrations are averaged there. May
-//! use the checker. It deliberately counts nothing.
+//! Owns the checks of `at x = …`, `at right`, parts of these, `at well …`, `in box(…)` and of the way
+//! concentrations are averaged there. May use the checker. It deliberately counts nothing.
 
 use super::check::Checker;
 use super::collect::Statements;
 use super::transport::sides::side_words;
 use super::transport::{Patch, SideRule};
-use super::{Axis, Domain, OutputKind, Station};
-use crate::diagnostic::codes::{D009, M001, M004, M005, M032};
+use super::{Axis, Domain, OutputKind, Scenario, Station};
+use crate::diagnostic::codes::{D009, M001, M004, M005, M026, M027, M032};
 use crate::diagnostic::{Diagnostic, precise};
 use crate::source::Span;
 use crate::syntax::tree;
@@ -54,25 +54,49 @@ pub(super) fn station<'a>(
         );
         return None;
     };
+    let averaging = (is_resident, written.averaging.as_ref().map(|name| name.span));
+    at_place(checker, statements, (written, place), kind, averaging, domain).map(Some)
+}
+
+/// The station of a written place; `averaging` is whether it is resident, and the word that says so.
+fn at_place<'a>(
+    checker: &mut Checker<'a>,
+    statements: &Statements<'a>,
+    (written, place): (&'a tree::Output, &'a tree::Place),
+    kind: OutputKind,
+    (is_resident, word): (Option<bool>, Option<Span>),
+    domain: Option<&Domain>,
+) -> Option<Station> {
     match place {
         tree::Place::Box(span, ranges) => {
             if kind != OutputKind::Breakthrough {
                 return no_meaning(checker, kind, *span, "a box", "a plane or a side");
             }
-            if let (Some(false), Some(name)) = (is_resident, &written.averaging) {
-                return no_meaning(checker, kind, name.span, "a flux through a box", "`resident`");
+            if let (Some(false), Some(span)) = (is_resident, word) {
+                return no_meaning(checker, kind, span, "a flux through a box", "`resident`");
             }
             let (low, high) = limits(checker, *span, ranges, domain?)?;
-            Some(Some(Station::Box { low, high }))
+            Some(Station::Box { low, high })
         }
-        tree::Place::Side(name) => {
-            let side = side(checker, name, domain?)?;
-            match is_resident {
-                Some(true) => no_meaning(checker, kind, name.span, "a resident mean at a side", "a plane"),
-                _ => Some(Some(Station::Side(side))),
+        tree::Place::Well(name) => {
+            if let (Some(true), Some(span)) = (is_resident, word) {
+                return no_meaning(checker, kind, span, "a resident mean at a well", "a box around it");
             }
+            needs_masses(checker, statements, name.span, "wells")?;
+            well(checker, statements, name)
         }
-        tree::Place::Plane(name, value) => {
+        tree::Place::Side(name, limits) => {
+            if let Some(first) = limits.first() {
+                needs_masses(checker, statements, first.name.span, "parts of sides")?;
+            }
+            let side = side(checker, name, domain?)?;
+            if is_resident == Some(true) {
+                return no_meaning(checker, kind, name.span, "a resident mean at a side", "a plane");
+            }
+            let part = part(checker, limits, domain?, side / 2)?;
+            Some(limited(Station::Side(side), limits, part))
+        }
+        tree::Place::Plane(name, value, limits) => {
             let words: Vec<(String, usize)> = checker.axes.clone();
             let words: Vec<(&str, usize)> =
                 words.iter().enumerate().map(|(idx, (name, _))| (name.as_str(), idx)).collect();
@@ -83,12 +107,35 @@ pub(super) fn station<'a>(
             let is_inside = (axis.low..=axis.high).contains(&at.value);
             let found = format!("{} m", precise(at.value));
             checker.require(is_inside, "the place of a plane", found, &rule, at.span)?;
+            let part = part(checker, limits, domain?, axis_idx)?;
             if is_resident == Some(true) {
-                return slab(checker, written, domain?, axis_idx, at.value).map(Some);
+                return slab(checker, written, axis, part, (axis_idx, at.value));
             }
-            Some(Some(plane(axis, axis_idx, at.value)))
+            Some(limited(plane(axis, axis_idx, at.value), limits, part))
         }
     }
+}
+
+/// Reports a place at which only masses are counted yet.
+fn needs_masses(
+    checker: &mut Checker<'_>,
+    statements: &Statements<'_>,
+    span: Span,
+    what: &str,
+) -> Option<()> {
+    let (_, particles) = statements.particles?;
+    if particles.kind.value == "mass" {
+        return Some(());
+    }
+    checker.report(
+        Diagnostic::error(M026, format!("fluid particles are not counted at {what} yet"))
+            .at(span, "not with particles of fluid")
+            .also(particles.kind.span, "parcels of water")
+            .found(format!("`particles {}`", particles.kind.value))
+            .expected("`particles mass`, or a plane or a whole side")
+            .help("what parcels leave by a whole side is counted; a `budget` has all sides"),
+    );
+    None
 }
 
 fn no_meaning<T>(
@@ -146,13 +193,106 @@ fn is_wall(side: &[Patch]) -> bool {
     !side.iter().all(|patch| matches!(patch.rule, SideRule::Open | SideRule::Periodic))
 }
 
-/// The bin around a plane.
+/// A place, or the part of it that is written.
+fn limited(of: Station, written: &[tree::Axis], (low, high): (Vec<f64>, Vec<f64>)) -> Station {
+    if written.is_empty() { of } else { Station::Part { of: Box::new(of), low, high } }
+}
+
+/// Lower and upper limits of a part of a plane; those of the domain where nothing is written.
+fn part<'a>(
+    checker: &mut Checker<'a>,
+    written: &'a [tree::Axis],
+    domain: &Domain,
+    normal: usize,
+) -> Option<(Vec<f64>, Vec<f64>)> {
+    let mut low: Vec<f64> = domain.axes.iter().map(|axis| axis.low).collect();
+    let mut high: Vec<f64> = domain.axes.iter().map(|axis| axis.high).collect();
+    let words: Vec<(String, usize)> = checker.axes.clone();
+    let words: Vec<(&str, usize)> =
+        words.iter().enumerate().map(|(idx, (name, _))| (name.as_str(), idx)).collect();
+    let mut taken = vec![normal];
+    for limit in written {
+        let axis = checker.word(&limit.name, "an axis of the domain", &words);
+        let range = checker.range(&limit.range, "this part of a plane", Some(Dimension::LENGTH));
+        let (axis, (from, to, _)) = (axis?, range?);
+        if taken.contains(&axis) {
+            let message = match axis == normal {
+                true => "a plane has no extent along its own axis",
+                false => "an axis is limited twice",
+            };
+            checker.report(
+                Diagnostic::error(M027, message)
+                    .at(limit.name.span, "not this axis")
+                    .found(format!("`{} = …`", limit.name.value))
+                    .expected("each of the other axes once"),
+            );
+            return None;
+        }
+        taken.push(axis);
+        let rule = format!("within {} m .. {} m", precise(low[axis]), precise(high[axis]));
+        let found = format!("{} m .. {} m", precise(from.value), precise(to.value));
+        let is_inside = from.value >= low[axis] && to.value <= high[axis];
+        checker.require(is_inside, "this part of a plane", found, &rule, from.span.to(to.span))?;
+        (low[axis], high[axis]) = (from.value, to.value);
+    }
+    Some((low, high))
+}
+
+/// A well of the flow, by its name.
+fn well(checker: &mut Checker<'_>, statements: &Statements<'_>, name: &tree::Name) -> Option<Station> {
+    if matches!(statements.flow, Some((_, tree::Flow { argument: tree::FlowArgument::Files(..), .. }))) {
+        // What takes water out is known when the files have been read.
+        return Some(Station::Well(name.value.clone()));
+    }
+    let written = match statements.flow {
+        Some((_, tree::Flow { argument: tree::FlowArgument::Entries(entries), .. })) => &entries[..],
+        _ => &[],
+    };
+    let mut words: Vec<(&str, ())> = Vec::new();
+    for entry in written {
+        if let tree::DarcyKind::Well(well) = &entry.kind {
+            words.push((&well.name.value, ()));
+        }
+    }
+    if words.is_empty() {
+        checker.report(
+            Diagnostic::error(M005, "this scene has no wells")
+                .at(name.span, "a well")
+                .found(format!("`{}`", name.value))
+                .expected("a `well` in `flow darcy`, or another place")
+                .help("write for example `at x = 10 m`, or add `well NAME at (…) rate …` to `flow darcy`"),
+        );
+        return None;
+    }
+    checker.word(name, "a well of this scene", &words)?;
+    Some(Station::Well(name.value.clone()))
+}
+
+/// Reports wells that nothing is taken out by.
+pub(super) fn check_wells(checker: &mut Checker<'_>, scenario: &Scenario) {
+    let Some(super::transport::Flow::Darcy(flow)) = scenario.flow.as_ref().map(|flow| &flow.value) else {
+        return;
+    };
+    for output in &scenario.outputs {
+        let Some(Station::Well(name)) = &output.station else { continue };
+        if flow.wells.iter().any(|well| well.name == *name && well.rate >= 0.0) {
+            checker.report(
+                Diagnostic::error(M005, format!("well `{name}` takes nothing out"))
+                    .at(output.span, "what leaves with the water of a well is counted")
+                    .found("a well that puts water in")
+                    .expected("a well with a rate below zero, or another place"),
+            );
+        }
+    }
+}
+
+/// The bin around a plane, or around a part of it.
 fn slab<'a>(
     checker: &mut Checker<'a>,
     written: &'a tree::Output,
-    domain: &Domain,
-    axis_idx: usize,
-    at: f64,
+    axis: &Axis,
+    (mut low, mut high): (Vec<f64>, Vec<f64>),
+    (axis_idx, at): (usize, f64),
 ) -> Option<Station> {
     let [count] = &written.grid[..] else {
         checker.report(
@@ -165,10 +305,7 @@ fn slab<'a>(
         return None;
     };
     let count = super::geometry::count_of(checker, count, "the number of bins")?;
-    let axis = &domain.axes[axis_idx];
     let half = 0.5 * (axis.high - axis.low) / count as f64;
-    let mut low: Vec<f64> = domain.axes.iter().map(|axis| axis.low).collect();
-    let mut high: Vec<f64> = domain.axes.iter().map(|axis| axis.high).collect();
     low[axis_idx] = (at - half).max(axis.low);
     high[axis_idx] = (at + half).min(axis.high);
     Some(Station::Box { low, high })

@@ -66,6 +66,11 @@ impl<'a> Judge<'a> {
                 ExpectKind::Holds(condition) => {
                     verdict.check(self.scene, combination, condition, row, &value)
                 }
+                ExpectKind::Mean { measure, .. } => {
+                    let number = value(&Variable::Measure(measure.clone()));
+                    let sample = Sample { number: row.point, line: Vec::new(), axis: 0.0, value: number };
+                    verdict.samples.push(Sample { line: vec![combination], ..sample });
+                }
                 ExpectKind::Order { measure, axis, .. } => {
                     let number = value(&Variable::Measure(measure.clone()));
                     if !number.is_finite() {
@@ -126,6 +131,10 @@ impl Verdict<'_> {
                 let (outcome, detail) = self.condition(is_whole);
                 (outcome, detail, None)
             }
+            ExpectKind::Mean { measure, low, high } => {
+                let (outcome, detail) = self.mean(scene, measure, (*low, *high), is_whole);
+                (outcome, detail, None)
+            }
             ExpectKind::Order { measure, axis, low, high } => {
                 let (measure, axis) = (measure.clone(), axis.name().to_owned());
                 let (outcome, detail) = self.order(*low, *high, is_whole);
@@ -150,6 +159,52 @@ impl Verdict<'_> {
         }
         let detail = format!("{} replicates", self.n_looked_at);
         (if is_whole { ExpectationOutcome::Met } else { ExpectationOutcome::Unknown }, detail)
+    }
+
+    /// The means over the replicates of each point; those out of range are named, or the one nearest to an end.
+    fn mean(
+        &self,
+        scene: &Scene,
+        measure: &str,
+        (low, high): (f64, f64),
+        is_whole: bool,
+    ) -> (ExpectationOutcome, String) {
+        let mut points: Vec<(u64, u32, Vec<f64>)> = Vec::new();
+        for sample in &self.samples {
+            match points.iter_mut().rfind(|(_, number, _)| *number == sample.number) {
+                Some((.., values)) => values.push(sample.value),
+                None => points.push((sample.line[0], sample.number, vec![sample.value])),
+            }
+        }
+        let shown = |(combination, number, values): &(u64, u32, Vec<f64>)| {
+            let n = values.len() as f64;
+            let mean = values.iter().sum::<f64>() / n;
+            let square: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
+            let digits = crate::diagnostic::number;
+            let error = if n > 1.0 {
+                format!(" ± {}", digits((square / (n - 1.0) / n).sqrt()))
+            } else {
+                String::new()
+            };
+            let name = scene.name(*combination);
+            let of = if name.is_empty() { String::new() } else { format!(" ({name})") };
+            (mean, format!("{measure} = {}{error} at point {number}{of}", digits(mean)))
+        };
+        let means: Vec<(f64, String)> = points.iter().map(shown).collect();
+        if means.is_empty() || means.iter().any(|(mean, _)| mean.is_nan()) {
+            return (ExpectationOutcome::Unknown, "a replicate has no value".to_owned());
+        }
+        let broken: Vec<&str> = means
+            .iter()
+            .filter(|(mean, _)| !(low..=high).contains(mean))
+            .map(|(_, text)| &text[..])
+            .collect();
+        if !broken.is_empty() {
+            return (ExpectationOutcome::NotMet, broken[..broken.len().min(MAX_NAMED)].join("; "));
+        }
+        let texts: Vec<&str> = means.iter().take(MAX_NAMED).map(|(_, text)| &text[..]).collect();
+        let outcome = if is_whole { ExpectationOutcome::Met } else { ExpectationOutcome::Unknown };
+        (outcome, texts.join("; "))
     }
 
     /// The slope over all lines, each with an offset of its own.

@@ -9,6 +9,7 @@ use crate::diagnostic::codes;
 use crate::engine::snapshot::{Outcome, Snapshot, Values};
 use crate::engine::{self, Control, RunError};
 use crate::flow::FaceFlow;
+use crate::flow::statistics::Statistics;
 use crate::measure::{self, Evaluated};
 use crate::plan::compile::Compiled;
 use crate::plan::evaluation::Evaluation;
@@ -187,6 +188,16 @@ fn results(plan: &Plan, n_axes: usize, evaluated: &Evaluated) -> (Vec<Value>, Ve
     (values, report::error_rows(plan, n_axes, &evaluated.errors))
 }
 
+/// The flow of a replicate anew, where measures speak of it.
+fn flow_of(compiled: &Compiled, seed: u64) -> Option<Statistics> {
+    if !compiled.evaluation.has_flow() {
+        return None;
+    }
+    let plan = compiled.plan.with_seed(seed);
+    let solution = crate::flow::build::of(&plan).ok().flatten()?;
+    Some(Statistics::of(&plan, &solution.flow))
+}
+
 /// Brings a recorded replicate up to date with the references and measures of today.
 pub fn refresh(recorded: &mut Replicate, scenario: &Scenario, compiled: &Compiled) {
     let key = evaluation_key(&compiled.evaluation);
@@ -204,6 +215,7 @@ pub fn refresh(recorded: &mut Replicate, scenario: &Scenario, compiled: &Compile
         wall: row.wall,
         cpu: row.cpu,
         state_bytes: 0,
+        flow: flow_of(compiled, row.seed),
     };
     let binned: Vec<Snapshot> = recorded
         .snapshots

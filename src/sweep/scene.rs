@@ -164,7 +164,7 @@ impl Scene {
 
     /// The plan of another replicate, and its key.
     pub fn replicate(&self, plan: &Plan, combination: u64, replicate: u32) -> (Plan, Key) {
-        let plan = Plan { seed: self.seed(combination, replicate), ..plan.clone() };
+        let plan = plan.with_seed(self.seed(combination, replicate));
         let key = plan_key(&plan);
         (plan, key)
     }

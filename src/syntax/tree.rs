@@ -4,11 +4,13 @@
 //! It deliberately knows no physics: a unit is text here, a species is a name.
 
 mod data;
+mod outputs;
 mod study;
 mod transport;
 
 use crate::source::{Span, Spanned};
 pub use data::{Data, DataColumn};
+pub use outputs::{Output, Place, Times};
 pub use study::{Criterion, Expect, Replicates, Report, Sweep, SweepAxis, SweepEntry, SweepValue, Use};
 pub use transport::{
     Boundary, Column, DarcyEntry, DarcyKind, Dispersion, FileEntry, FileValue, Flow, FlowArgument,
@@ -274,50 +276,6 @@ pub struct Run {
     pub step: Option<Expr>,
     /// Further `, word word` settings, such as `normals double`.
     pub settings: Vec<(Name, Name)>,
-}
-
-#[derive(Debug, Clone, PartialEq)]
-pub struct Output {
-    /// A catalogue name: `profile`, `total`, `breakthrough`, …
-    pub kind: Name,
-    pub species: Vec<Name>,
-    pub times: Option<Times>,
-    /// `along y`
-    pub along: Option<Name>,
-    /// `on 200 x 80`
-    pub grid: Vec<Expr>,
-    /// `at x = 10 m`, `at right`, `in box(…)`
-    pub place: Option<Place>,
-    /// `resident`, `flux_weighted`
-    pub averaging: Option<Name>,
-    /// The text after `in`: a unit, as written.
-    pub unit: Option<Spanned<String>>,
-}
-
-/// Where an output is taken.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Place {
-    Plane(Name, Expr),
-    Side(Name),
-    Box(Span, Vec<Range>),
-}
-
-impl Place {
-    pub fn span(&self) -> Span {
-        match self {
-            Self::Plane(name, at) => name.span.to(at.span),
-            Self::Side(name) => name.span,
-            Self::Box(span, _) => *span,
-        }
-    }
-}
-
-#[derive(Debug, Clone, PartialEq)]
-pub enum Times {
-    /// `at t = a, b, …`
-    List(Vec<Expr>),
-    /// `every e`
-    Every(Expr),
 }
 
 #[derive(Debug, Clone, PartialEq)]

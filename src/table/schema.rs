@@ -199,9 +199,13 @@ pub fn columns(kind: Kind) -> Vec<Column> {
 fn row_columns(kind: OutputKind) -> Vec<Column> {
     let mut columns = Vec::new();
     if kind.has_station() {
-        columns.push(plain("place", word(), "plane, box, or the name of a side"));
+        columns.push(plain(
+            "place",
+            word(),
+            "plane, box, the name of a side or a well, or `part of` the first",
+        ));
         columns.extend(["x", "y", "z"].map(|name| {
-            let doc = "where the plane or the side is, or the centre of the box; null along other axes";
+            let doc = "where the plane or the side is, or the centre of the box, the part or the well; null along other axes";
             Column::new(name, DataType::Float64, Measured::Fixed(Dimension::LENGTH), doc).or_null()
         }));
     } else if kind.has_places() {

@@ -1,6 +1,7 @@
 //! Sweeps as a user runs them: resumed, killed, damaged, cut into shards, and always the same tables.
 
 mod durability;
+mod experiments;
 mod points;
 #[path = "../cli/program.rs"]
 mod program;

@@ -50,6 +50,7 @@ fn outputs(predicts: Predicts) -> &'static str {
         Predicts::Covariance => "`covariance` of a pair",
         Predicts::Gamma => "`mixing` of a pair",
         Predicts::Total => "`total` of a species",
+        Predicts::Moment => "`xx`, `yy` or `zz` of the `moments` of a species",
     }
 }
 

@@ -12,6 +12,7 @@ mod front_limit;
 mod gaussian_closure;
 mod gaussian_pulse;
 mod inflow;
+mod macrodispersion;
 #[cfg(test)]
 mod manual;
 mod michaelis_menten;
@@ -47,6 +48,8 @@ pub const ALL: &[Item] = &[
     decaying_inflow::FIXED_CONCENTRATION,
     decaying_inflow::FIXED_FLUX,
     michaelis_menten::ITEM,
+    macrodispersion::ALONG,
+    macrodispersion::ACROSS,
 ];
 
 /// The item of that name.
@@ -87,6 +90,8 @@ pub enum Predicts {
     Gamma,
     /// Amount: `total`.
     Total,
+    /// A second moment: `xx`, `yy` or `zz` of `moments`.
+    Moment,
 }
 
 /// One item of the catalogue.

@@ -121,6 +121,7 @@ fn concentrations_scale_with_the_concentration() {
     for item in ALL {
         let powers = match item.predicts {
             super::Predicts::Concentration | super::Predicts::Total => 1,
+            super::Predicts::Moment => 0,
             super::Predicts::Covariance => 2,
             super::Predicts::Gamma => continue,
         };

@@ -39,12 +39,21 @@ impl<const D: usize, M: Medium<D>> Run<'_, D, M> {
                 t: t + birth.entered.max(EARLIEST) * dt,
             };
             let mut events = vec![event(What::Entered { origin })];
+            let place = |axis: usize| birth.position[axis];
             if let Kind::Held { axis, sign, .. } = self.releases[origin].kind {
                 // It has come from the side to where it is: planes on that way were crossed.
                 for (plane, of) in self.tracker.planes.iter().enumerate().filter(|(_, of)| of.axis == axis) {
-                    if sign * (birth.position[axis] - of.at) > 0.0 {
+                    let is_in_part = of.part.as_ref().is_none_or(|part| part.holds(axis, place));
+                    if sign * (birth.position[axis] - of.at) > 0.0 && is_in_part {
                         events.push(event(What::Crossed { plane, is_forward: sign > 0.0 }));
                     }
+                }
+            }
+            let side = self.side_of(birth.id);
+            for (idx, gap) in self.tracker.gaps.iter().enumerate() {
+                if side == Some(gap.side) && gap.part.holds(gap.side / 2, place) {
+                    let plane = self.tracker.planes.len() + idx;
+                    events.push(event(What::Crossed { plane, is_forward: false }));
                 }
             }
             self.note(&events);

@@ -5,7 +5,7 @@
 
 use super::super::schedule::{Due, step_length};
 use super::super::snapshot::{Row, Snapshot, Values};
-use super::super::track::monitors::{Plane, Watch};
+use super::super::track::monitors::{Gap, Part, Plane, Watch};
 use super::book::{Event, What};
 use super::flock;
 use crate::maths::exact::{Quanta, Sum};
@@ -20,7 +20,10 @@ const SLACK: f64 = 1e-9;
 enum Trigger {
     /// Number among the tracker's planes.
     Plane(usize),
+    /// Number among sides, and wells behind them.
     Side(usize),
+    /// Number among the tracker's gaps.
+    Gap(usize),
 }
 
 /// One output of what passes a place.
@@ -55,16 +58,16 @@ struct Bin {
 #[derive(Debug, Clone, Default)]
 pub struct Gates {
     gates: Vec<Gate>,
+    /// Planes of the tracker; gaps are counted on behind them.
+    n_planes: usize,
 }
 
 impl Gates {
-    /// Takes the outputs of gates out of the dues, and their planes to the tracker's. `water` tells how much
-    /// goes through a station.
-    pub fn new(
+    /// Takes the outputs of gates out of the dues. `water` tells how much goes through a station.
+    pub fn new<const D: usize>(
         plan: &Plan,
         dues: &mut Vec<Due>,
-        planes: &mut Vec<Plane>,
-        period: impl Fn(usize) -> Option<f64>,
+        monitors: &mut Monitors<D>,
         water: impl Fn(&Station) -> f64,
     ) -> Self {
         let mut gates = Vec::new();
@@ -73,23 +76,14 @@ impl Gates {
             let Some(station) = output.station.as_ref().filter(|_| is_gate(output)) else { continue };
             let own: Vec<&Due> = dues.iter().filter(|due| due.outputs.contains(&output_idx)).collect();
             let is_first_passage = output.kind == OutputKind::FirstPassage;
-            let watch = match (is_first_passage, has_sub_steps || own.iter().any(|due| due.fraction > 0.0)) {
+            let is_part = matches!(station, Station::Part { .. });
+            let is_between = has_sub_steps || is_part || own.iter().any(|due| due.fraction > 0.0);
+            let watch = match (is_first_passage, is_between) {
                 (true, _) => Watch::Touch,
                 (false, true) => Watch::Times,
                 (false, false) => Watch::Ends,
             };
-            let trigger = match *station {
-                Station::Plane { axis, at } => {
-                    let plane = Plane { axis, at, period: period(axis), watch };
-                    let number = planes.iter().position(|other| *other == plane).unwrap_or_else(|| {
-                        planes.push(plane);
-                        planes.len() - 1
-                    });
-                    Trigger::Plane(number)
-                }
-                Station::Side(side) => Trigger::Side(side),
-                Station::Box { .. } => continue,
-            };
+            let Some(trigger) = monitors.trigger(plan, station, watch) else { continue };
             let time = &plan.time;
             let end = |due: &Due| match due.fraction == 0.0 {
                 true if due.steps >= time.n_steps => f64::INFINITY,
@@ -116,7 +110,7 @@ impl Gates {
             due.outputs.retain(|&idx| !is_gate(&plan.outputs[idx]));
         }
         dues.retain(|due| !due.outputs.is_empty());
-        Self { gates }
+        Self { gates, n_planes: monitors.planes.len() }
     }
 
     pub fn are_none(&self) -> bool {
@@ -125,7 +119,8 @@ impl Gates {
 
     #[inline]
     pub fn note(&mut self, event: &Event, entered_by: Option<usize>, quanta: Quanta) {
-        self.gates.iter_mut().for_each(|gate| gate.note(event, entered_by, quanta));
+        let n_planes = self.n_planes;
+        self.gates.iter_mut().for_each(|gate| gate.note(event, entered_by, n_planes, quanta));
     }
 
     /// Everything that is complete after so many steps.
@@ -134,9 +129,60 @@ impl Gates {
     }
 }
 
+/// What the tracker has to look out for.
+#[derive(Debug, Clone)]
+pub struct Monitors<const D: usize> {
+    pub planes: Vec<Plane<D>>,
+    pub gaps: Vec<Gap<D>>,
+    pub periods: [Option<(f64, f64)>; D],
+}
+
+impl<const D: usize> Monitors<D> {
+    /// What a station hears of; nothing in a box, where nothing passes.
+    fn trigger(&mut self, plan: &Plan, station: &Station, watch: Watch) -> Option<Trigger> {
+        match station {
+            Station::Plane { axis, at } => Some(self.plane(*axis, *at, watch, None)),
+            Station::Side(side) => Some(Trigger::Side(*side)),
+            Station::Well(name) => Some(Trigger::Side(2 * D + plan.outlet(name)?.0)),
+            Station::Part { of, low, high } => {
+                let part = part(plan, low, high);
+                match **of {
+                    Station::Plane { axis, at } => Some(self.plane(axis, at, watch, Some(part))),
+                    Station::Side(side) => {
+                        self.gaps.push(Gap { side, part });
+                        Some(Trigger::Gap(self.gaps.len() - 1))
+                    }
+                    _ => None,
+                }
+            }
+            Station::Box { .. } => None,
+        }
+    }
+
+    fn plane(&mut self, axis: usize, at: f64, watch: Watch, part: Option<Part<D>>) -> Trigger {
+        let is_here = |other: &&Plane<D>| (other.axis, other.at, other.watch) == (axis, at, watch);
+        let draws = self.planes.iter().find(is_here).map_or(self.planes.len(), |other| other.draws);
+        let plane = Plane { axis, at, periods: self.periods, watch, part, draws };
+        let number = self.planes.iter().position(|other| *other == plane).unwrap_or_else(|| {
+            self.planes.push(plane);
+            self.planes.len() - 1
+        });
+        Trigger::Plane(number)
+    }
+}
+
+/// A part with limits only where they are not the ends of the domain: what is on or behind a wall belongs to it.
+fn part<const D: usize>(plan: &Plan, low: &[f64], high: &[f64]) -> Part<D> {
+    let limit = |at: f64, end: f64, beyond: f64| if at == end { beyond } else { at };
+    Part {
+        low: std::array::from_fn(|axis| limit(low[axis], plan.axes[axis].low, f64::NEG_INFINITY)),
+        high: std::array::from_fn(|axis| limit(high[axis], plan.axes[axis].high, f64::INFINITY)),
+    }
+}
+
 /// Whether an output counts what passes.
 fn is_gate(output: &Output) -> bool {
-    matches!(output.station, Some(Station::Plane { .. } | Station::Side(_)))
+    output.station.as_ref().is_some_and(|station| !matches!(station, Station::Box { .. }))
 }
 
 /// The populations of an output's species, in its order; nothing is carried by some. Parcels of water carry them all.
@@ -153,14 +199,21 @@ pub fn populations(plan: &Plan, output: &Output) -> Vec<Option<usize>> {
 }
 
 impl Gate {
-    /// `entered_by` is the side that a particle came in through.
-    fn note(&mut self, event: &Event, entered_by: Option<usize>, quanta: Quanta) {
+    /// `entered_by` is the side that a particle came in through; `n_planes` are those before the gaps.
+    fn note(&mut self, event: &Event, entered_by: Option<usize>, n_planes: usize, quanta: Quanta) {
         let sign = match (self.trigger, event.what) {
             (Trigger::Plane(own), What::Crossed { plane, is_forward }) if own == plane => {
                 if is_forward {
                     1.0
                 } else {
                     -1.0
+                }
+            }
+            (Trigger::Gap(own), What::Crossed { plane, is_forward }) if n_planes + own == plane => {
+                match (is_forward, self.is_first_passage) {
+                    (true, _) => 1.0,
+                    (false, true) => return,
+                    (false, false) => -1.0,
                 }
             }
             (Trigger::Side(own), What::Left { side, .. }) if own == side => 1.0,

@@ -11,19 +11,19 @@ use super::super::schedule::{Due, schedule, step_length};
 use super::super::snapshot::{Outcome, Snapshot};
 use super::super::track::fates::Chain;
 use super::super::track::medium::{Carrier, Medium};
-use super::super::track::monitors::Plane;
 use super::super::track::noise::Draws;
 use super::super::track::tracker::{Bench, Steps, Tracker};
 use super::super::track::walls::Ends;
 use super::book::{Book, Event};
 use super::flock::{self, Flock};
-use super::gate::Gates;
+use super::gate::{Gates, Monitors};
 use super::observe::Scene;
 use super::order::Order;
 use super::release::{Birth, Kind, Release, Window};
 use super::units::Units;
 use super::world::Site;
 use crate::chemistry::Work;
+use crate::flow::statistics::Statistics;
 use crate::maths::exact::{MOST_TERMS, Quanta};
 use crate::maths::wide::Width;
 use crate::plan::{Normals, Station};
@@ -108,20 +108,22 @@ pub fn go<const D: usize, M: Medium<D>>(
         wall: clock.wall(),
         cpu: clock.cpu(),
         state_bytes: site.plan.particles.count * 8 * (D as u64 + 1),
+        flow: site.flow.as_ref().map(|flow| Statistics::of(site.plan, flow)),
     })
 }
 
 impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
     fn new(site: &'a Site<'a, D>, medium: M, width: Width, dues: &mut Vec<Due>) -> Result<Self, RunError> {
         let mut tracker = site.tracker(medium, width)?;
-        let mut planes: Vec<Plane> = Vec::new();
         let period = |axis: usize| match tracker.ends[axis] {
-            Ends::Periodic { low, high } => Some(high - low),
+            Ends::Periodic { low, high } => Some((low, high)),
             Ends::Walls(_) => None,
         };
+        let periods = std::array::from_fn(period);
+        let mut monitors = Monitors { planes: Vec::new(), gaps: Vec::new(), periods };
         let water = |station: &Station| site.water(&tracker.medium, station);
-        let gates = Gates::new(site.plan, dues, &mut planes, period, water);
-        tracker.planes = planes;
+        let gates = Gates::new(site.plan, dues, &mut monitors, water);
+        (tracker.planes, tracker.gaps) = (monitors.planes, monitors.gaps);
         let chain =
             site.transport.decay.as_ref().map(|decay| Chain::new(decay, &site.carriers(), site.plan.seed));
         let releases = site.releases(&tracker)?;
@@ -166,7 +168,7 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
     }
 
     /// The side that a particle came in through.
-    fn side_of(&self, id: u64) -> Option<usize> {
+    pub fn side_of(&self, id: u64) -> Option<usize> {
         self.releases[flock::origin(id)].door.checked_sub(1 + self.site.transport.sources.len())
     }
 
@@ -237,6 +239,7 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
         let aside = Draws::aside(plan.seed, D, plan.walk.normals == Normals::Double);
         let draws = std::mem::replace(&mut self.tracker.draws, aside);
         let planes = std::mem::take(&mut self.tracker.planes);
+        let gaps = std::mem::take(&mut self.tracker.gaps);
         let gates = std::mem::take(&mut self.gates);
         let chain = self.chain.clone();
         self.chain = chain.as_ref().map(|chain| chain.aside(plan.seed));
@@ -249,7 +252,8 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
         };
         let found = self.advance(steps).and_then(|()| self.look(due));
         (self.flocks, self.book, self.displacements) = (flocks, book, displacements);
-        (self.tracker.draws, self.tracker.planes, self.gates) = (draws, planes, gates);
+        (self.tracker.draws, self.tracker.planes, self.tracker.gaps) = (draws, planes, gaps);
+        self.gates = gates;
         self.chain = chain;
         found
     }

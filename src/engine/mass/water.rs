@@ -13,30 +13,58 @@ const POINTS: usize = 64;
 impl<const D: usize> Site<'_, D> {
     /// Water through a station in the direction that counts, m³/s (m², m with fewer axes).
     pub fn water<M: Medium<D>>(&self, medium: &M, station: &Station) -> f64 {
+        match station {
+            Station::Part { of, low, high } => {
+                let array = |list: &[f64]| std::array::from_fn(|axis| list[axis]);
+                self.water_within(medium, of, [array(low), array(high)])
+            }
+            Station::Well(name) => self.taken_out(name),
+            Station::Plane { .. } | Station::Side(_) => {
+                self.water_within(medium, station, [self.low, self.high])
+            }
+            Station::Box { .. } => f64::NAN,
+        }
+    }
+
+    /// Water that a well takes out of all its cells.
+    fn taken_out(&self, name: &str) -> f64 {
+        let (Some((_, outlet)), Some(flow)) = (self.plan.outlet(name), &self.flow) else { return f64::NAN };
+        let own = flow.sinks.iter().filter(|sink| sink.owner == outlet.owner && sink.rate > 0.0);
+        own.map(|sink| sink.rate).sum()
+    }
+
+    fn water_within<M: Medium<D>>(
+        &self,
+        medium: &M,
+        station: &Station,
+        within @ [low, high]: [[f64; D]; 2],
+    ) -> f64 {
         let (axis, at, sign) = match *station {
             Station::Plane { axis, at } => (axis, at, 1.0),
             Station::Side(side) if side % 2 == 0 => (side / 2, self.low[side / 2], -1.0),
             Station::Side(side) => (side / 2, self.high[side / 2], 1.0),
-            Station::Box { .. } => return f64::NAN,
+            _ => return f64::NAN,
         };
-        sign * match &self.flow {
-            Some(flow) => through(flow, self.plan.axes[axis].index, at),
-            None => self.by_points(medium, axis, at),
+        let Some(flow) = &self.flow else { return sign * self.by_points(medium, axis, at, within) };
+        let mut limits = [[f64::NEG_INFINITY; 3], [f64::INFINITY; 3]];
+        for (axis, of) in self.plan.axes.iter().enumerate() {
+            (limits[0][of.index], limits[1][of.index]) = (low[axis], high[axis]);
         }
+        sign * through(flow, self.plan.axes[axis].index, at, limits)
     }
 
-    /// The midpoint rule over a plane.
-    fn by_points<M: Medium<D>>(&self, medium: &M, axis: usize, at: f64) -> f64 {
+    /// The midpoint rule over a plane between limits.
+    fn by_points<M: Medium<D>>(&self, medium: &M, axis: usize, at: f64, [low, high]: [[f64; D]; 2]) -> f64 {
         let others: Vec<usize> = (0..D).filter(|&other| other != axis).collect();
-        let area: f64 = others.iter().map(|&other| self.high[other] - self.low[other]).product();
+        let area: f64 = others.iter().map(|&other| high[other] - low[other]).product();
         let n = POINTS.pow(others.len() as u32);
         let places: Vec<[f64; D]> = (0..n)
             .map(|mut idx| {
-                let mut place = self.low;
+                let mut place = low;
                 place[axis] = at;
                 for &other in &others {
                     let part = ((idx % POINTS) as f64 + 0.5) / POINTS as f64;
-                    place[other] += part * (self.high[other] - self.low[other]);
+                    place[other] += part * (high[other] - low[other]);
                     idx /= POINTS;
                 }
                 place
@@ -68,9 +96,9 @@ impl<const D: usize> Site<'_, D> {
     }
 }
 
-/// Discharge through a plane normal to an axis of the scene: linear between the faces on either side, as
-/// velocities in cells are.
-fn through(flow: &FaceFlow, axis: usize, at: f64) -> f64 {
+/// Discharge through a plane normal to an axis of the scene, between limits along the others: linear between the
+/// faces on either side, as velocities in cells are.
+fn through(flow: &FaceFlow, axis: usize, at: f64, [from, to]: [[f64; 3]; 2]) -> f64 {
     let edges = &flow.cells.edges()[axis];
     let n = flow.cells.n();
     let cell = edges.partition_point(|&edge| edge <= at).clamp(1, n[axis]) - 1;
@@ -85,7 +113,12 @@ fn through(flow: &FaceFlow, axis: usize, at: f64) -> f64 {
         for j in 0..n[b] {
             (place[a], place[b]) = (i, j);
             let (low, high) = flow.cells.faces(axis, place);
-            let area = flow.cells.face_area(axis, place);
+            let within = |axis: usize| {
+                let edges = &flow.cells.edges()[axis][place[axis]..place[axis] + 2];
+                let shared = edges[1].min(to[axis]) - edges[0].max(from[axis]);
+                (shared / (edges[1] - edges[0])).clamp(0.0, 1.0)
+            };
+            let area = flow.cells.face_area(axis, place) * within(a) * within(b);
             sums[0] += area * flow.flux[axis][low];
             sums[1] += area * flow.flux[axis][high];
         }

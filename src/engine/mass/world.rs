@@ -67,6 +67,7 @@ impl<'a, const D: usize> Site<'a, D> {
             medium,
             ends: ends.try_into().map_err(|_| unsound("sides that do not fit the axes"))?,
             planes: Vec::new(),
+            gaps: Vec::new(),
             drains: self.drains(),
             draws: Draws::new(self.plan.seed, D, is_double),
             interfaces: self

@@ -16,14 +16,42 @@ const FAR: f64 = 37.0;
 const FIRST_DRAW: u64 = 32;
 const N_DRAWS: u64 = 32;
 
-/// A plane normal to an axis.
+/// A plane normal to an axis, or a part of it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Plane {
+pub struct Plane<const D: usize> {
     pub axis: usize,
     pub at: f64,
-    /// Length of the axis where what leaves comes in at the other side: the plane is there again and again.
-    pub period: Option<f64>,
+    /// Ends of the axes along which what leaves comes in at the other side: planes are there again and again.
+    pub periods: [Option<(f64, f64)>; D],
     pub watch: Watch,
+    pub part: Option<Part<D>>,
+    /// Which draws it takes: parts of one plane share them, so that together they are the plane.
+    pub draws: usize,
+}
+
+/// A part of a plane or of a side. Limits along its own axis say nothing; those at the ends of the domain are infinite.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Part<const D: usize> {
+    pub low: [f64; D],
+    pub high: [f64; D],
+}
+
+impl<const D: usize> Part<D> {
+    /// Whether a place of a plane normal to `axis` belongs to it.
+    pub fn holds(&self, axis: usize, place: impl Fn(usize) -> f64) -> bool {
+        (0..D).filter(|&other| other != axis).all(|other| {
+            let at = place(other);
+            at >= self.low[other] && at < self.high[other]
+        })
+    }
+}
+
+/// A part of a side that somebody watches.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Gap<const D: usize> {
+    /// Twice the axis, plus one at its upper end.
+    pub side: usize,
+    pub part: Part<D>,
 }
 
 /// What of a displacement counts.
@@ -47,13 +75,12 @@ pub struct Crossing {
     pub fraction: f64,
 }
 
-impl Plane {
+impl<const D: usize> Plane<D> {
     /// Calls `found` for every passage of a displacement. `free` is where it would end without sides, and
     /// `gone` the lanes that had left before it.
     #[inline(always)]
-    pub fn crossings<const D: usize, M: Medium<D>>(
+    pub fn crossings<M: Medium<D>>(
         &self,
-        number: usize,
         stride: &Stride<D, M>,
         free: &[Lane; D],
         lanes: &Lanes<D>,
@@ -62,48 +89,72 @@ impl Plane {
     ) {
         let before = &stride.before[self.axis];
         // Around a period the way goes on; elsewhere it ends where the sides leave it.
-        let after = if self.period.is_some() { &free[self.axis] } else { &lanes.positions[self.axis] };
+        let after = self.after(self.axis, free, lanes);
         let mut spread = [0.0; LANES];
         if self.watch != Watch::Ends {
-            stride.medium.spread_along(stride.look, self.axis, &mut spread);
-            for lane in 0..LANES {
-                spread[lane] *= stride.leap.time[lane];
-            }
+            spread = spread_of(stride, self.axis);
         }
         let mut near = 0_u64;
         for lane in 0..LANES {
-            let is_near = match self.period {
+            let is_near = match self.periods[self.axis] {
                 Some(_) => true,
                 None => is_near(before[lane] - self.at, after[lane] - self.at, spread[lane]),
             };
             near |= u64::from(is_near) << lane;
         }
         near &= lanes.occupied() & !gone;
+        let mut across = None;
         while near != 0 {
             let lane = near.trailing_zeros() as usize;
             near &= near - 1;
             let way = Way { from: before[lane], to: after[lane], spread: spread[lane] };
             let draw = || {
-                let what = FIRST_DRAW + number as u64 % N_DRAWS;
+                let what = FIRST_DRAW + self.draws as u64 % N_DRAWS;
                 stride.draws.uniforms(lanes.ids[lane], stride.step, what)
             };
             self.passages(way, draw, |is_forward, fraction| {
-                found(Crossing { lane, is_forward, fraction });
+                let is_in_part = self.part.as_ref().is_none_or(|part| {
+                    let spreads = across.get_or_insert_with(|| {
+                        let spreads: [Lane; D] = std::array::from_fn(|axis| spread_of(stride, axis));
+                        spreads
+                    });
+                    let uniforms = draw();
+                    part.holds(self.axis, |axis| {
+                        let to = self.after(axis, free, lanes)[lane];
+                        let way = Way { from: stride.before[axis][lane], to, spread: spreads[axis][lane] };
+                        let first = if axis == (self.axis + 1) % D { 4 } else { 6 };
+                        self.fold(axis, way.at(fraction, [uniforms[first], uniforms[first + 1]]))
+                    })
+                });
+                if is_in_part {
+                    found(Crossing { lane, is_forward, fraction });
+                }
             });
         }
+    }
+
+    /// Where a displacement ends along an axis: on the way around a period, else where the sides leave it.
+    fn after<'a>(&self, axis: usize, free: &'a [Lane; D], lanes: &'a Lanes<D>) -> &'a Lane {
+        if self.periods[axis].is_some() { &free[axis] } else { &lanes.positions[axis] }
+    }
+
+    /// A place of a way around a period as one within it.
+    fn fold(&self, axis: usize, at: f64) -> f64 {
+        self.periods[axis].map_or(at, |(low, high)| low + (at - low).rem_euclid(high - low))
     }
 
     /// Passages of one way through the plane and its images.
     fn passages(&self, way: Way, draw: impl Fn() -> [f64; 8], mut found: impl FnMut(bool, f64)) {
         let (low, high) = (way.from.min(way.to), way.from.max(way.to));
-        let (first, last) = match self.period {
+        let period = self.periods[self.axis].map(|(low, high)| high - low);
+        let (first, last) = match period {
             None => (0.0, 0.0),
             Some(period) => (((low - self.at) / period).floor(), ((high - self.at) / period).floor() + 1.0),
         };
         let mut soonest: Option<(bool, f64)> = None;
         let mut image = first;
         while image <= last {
-            let at = self.at + image * self.period.unwrap_or(0.0);
+            let at = self.at + image * period.unwrap_or(0.0);
             let relative = Way { from: way.from - at, to: way.to - at, spread: way.spread };
             image += 1.0;
             if !is_near(relative.from, relative.to, relative.spread) {
@@ -129,6 +180,16 @@ impl Plane {
     }
 }
 
+/// `2 D Δt` of each lane along an axis.
+fn spread_of<const D: usize, M: Medium<D>>(stride: &Stride<D, M>, axis: usize) -> Lane {
+    let mut spread = [0.0; LANES];
+    stride.medium.spread_along(stride.look, axis, &mut spread);
+    for lane in 0..LANES {
+        spread[lane] *= stride.leap.time[lane];
+    }
+    spread
+}
+
 /// Whether a way between two distances from a plane crosses it, or may have touched it.
 #[inline(always)]
 fn is_near(from: f64, to: f64, spread: f64) -> bool {
@@ -145,6 +206,18 @@ struct Way {
 }
 
 impl Way {
+    /// Where the way is after a part of it.
+    ///
+    /// - Equation: `x₀ + u (x₁ − x₀) + z √(s u(1 − u))` for one normal number `z`.
+    /// - Symbols: as in [`Way::crossings`].
+    /// - Range: any step; what the axes have in common beside their ends is left out.
+    /// - Source: the law of the Brownian bridge.
+    /// - Shape: one particle.
+    fn at(self, part: f64, uniforms: [f64; 2]) -> f64 {
+        let deviation = (self.spread * part * (1.0 - part)).max(0.0).sqrt();
+        self.from + part * (self.to - self.from) + deviation * normal(uniforms[0], uniforms[1])
+    }
+
     fn changes_side(self) -> bool {
         (self.from < 0.0) != (self.to < 0.0)
     }
@@ -287,7 +360,8 @@ mod tests {
 
     #[test]
     fn around_a_period_a_way_passes_every_image() {
-        let plane = Plane { axis: 0, at: 0.25, period: Some(1.0), watch: Watch::Ends };
+        let periods = [Some((0.0, 1.0))];
+        let plane = Plane { axis: 0, at: 0.25, periods, watch: Watch::Ends, part: None, draws: 0 };
         let mut passages = Vec::new();
         let mut note = |is_forward, fraction: f64| passages.push((is_forward, fraction));
         let way = |from, to| Way { from, to, spread: 0.0 };

@@ -7,7 +7,7 @@ use super::drains::Drain;
 use super::interfaces::Interface;
 use super::lanes::{LANES, Lane, Lanes};
 use super::medium::{Carrier, Criteria, Leap, Medium};
-use super::monitors::{Crossing, Plane};
+use super::monitors::{Crossing, Gap, Plane};
 use super::noise::{Draws, Normals};
 use super::turning::Fates;
 use super::walls::{Ends, Exit, Met, Stride, Touch};
@@ -27,7 +27,9 @@ pub struct Tracker<const D: usize, M: Medium<D>> {
     /// Boxes that water is taken from.
     pub drains: Vec<Drain<D>>,
     pub interfaces: Vec<Interface>,
-    pub planes: Vec<Plane>,
+    pub planes: Vec<Plane<D>>,
+    /// Parts of sides that are watched; what leaves through one crosses the plane of a number behind those of planes.
+    pub gaps: Vec<Gap<D>>,
     pub draws: Draws,
     /// Steps of each particle's own, if any.
     pub criteria: Option<Criteria>,
@@ -216,7 +218,7 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
         }
         for (idx, plane) in self.planes.iter().enumerate() {
             let Some(free) = &free else { continue };
-            plane.crossings(idx, &stride, free, lanes, was_gone, |crossing| {
+            plane.crossings(&stride, free, lanes, was_gone, |crossing| {
                 let t = start[crossing.lane] + crossing.fraction * leap.time[crossing.lane];
                 events.crossed(lanes.ids[crossing.lane], idx, crossing, t.max(earliest));
             });
@@ -227,6 +229,14 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
         for exit in met.exits.drain(..) {
             let t = start[exit.lane] + exit.fraction * leap.time[exit.lane];
             events.left(lanes.ids[exit.lane], exit, t.max(earliest));
+            for (idx, gap) in self.gaps.iter().enumerate() {
+                if gap.side == exit.side
+                    && gap.part.holds(gap.side / 2, |axis| lanes.positions[axis][exit.lane])
+                {
+                    let crossing = Crossing { lane: exit.lane, is_forward: true, fraction: exit.fraction };
+                    events.crossed(lanes.ids[exit.lane], self.planes.len() + idx, crossing, t.max(earliest));
+                }
+            }
         }
     }
 }

@@ -5,7 +5,7 @@
 
 use super::super::error::RunError;
 use super::super::mass::book::What;
-use super::super::mass::gate::Gates;
+use super::super::mass::gate::{Gates, Monitors};
 use super::super::mass::media::InMedium;
 use super::super::mass::world::Site;
 use super::super::parallel::Pool;
@@ -77,14 +77,15 @@ impl<const D: usize> InMedium<D> for Launch<'_> {
 
     fn go<M: Medium<D> + Send + 'static>(self, site: &Site<D>, medium: M) -> Result<Self::Output, RunError> {
         let mut tracker = site.tracker(medium, self.width)?;
-        let mut planes = Vec::new();
         let period = |axis: usize| match tracker.ends[axis] {
-            Ends::Periodic { low, high } => Some(high - low),
+            Ends::Periodic { low, high } => Some((low, high)),
             Ends::Walls(_) => None,
         };
+        let periods = std::array::from_fn(period);
+        let mut monitors = Monitors { planes: Vec::new(), gaps: Vec::new(), periods };
         let water = |station: &Station| site.water(&tracker.medium, station);
-        let gates = Gates::new(site.plan, self.dues, &mut planes, period, water);
-        tracker.planes = planes;
+        let gates = Gates::new(site.plan, self.dues, &mut monitors, water);
+        (tracker.planes, tracker.gaps) = (monitors.planes, monitors.gaps);
         let is_watched = |side: &usize| {
             site.plan.outputs.iter().any(|output| output.station == Some(Station::Side(*side)))
         };

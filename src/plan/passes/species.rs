@@ -194,7 +194,7 @@ fn renumber_scalar(scalar: &mut Scalar, is_kept: &[bool], quantity: &impl Fn(&mu
 fn renumber_field(field: &mut Field, is_kept: &[bool], quantity: &impl Fn(&mut Quantity)) {
     match field {
         Field::Number(_) | Field::Position(_) => {}
-        Field::Output(_, target) => quantity(target),
+        Field::Output(_, target) | Field::Column(_, target, _) => quantity(target),
         Field::Reference(idx) => *idx = is_kept[..*idx].iter().filter(|is_kept| **is_kept).count(),
         Field::Unary(_, a) => renumber_field(a, is_kept, quantity),
         Field::Binary(_, a, b) => {

@@ -78,8 +78,10 @@ impl Story<'_> {
     fn html(&self) -> String {
         let mut panels: Vec<Vec<&Course>> = Vec::new();
         for course in self.courses {
-            let is_mine =
-                |panel: &&mut Vec<&Course>| panel[0].output == course.output && panel[0].name == course.name;
+            let is_mine = |panel: &&mut Vec<&Course>| {
+                let first = panel[0];
+                (first.output, &first.name, first.number) == (course.output, &course.name, course.number)
+            };
             match panels.iter_mut().find(is_mine) {
                 Some(panel) => panel.push(course),
                 None => panels.push(vec![course]),
@@ -176,10 +178,11 @@ impl Story<'_> {
         let (title, what) = match self.kind {
             Kind::Covariance => (format!("cov({name})"), "covariance"),
             Kind::Mixing => (format!("γ({name})"), "γ"),
-            Kind::Total | Kind::Moments => (format!("total {name}"), "amount"),
-            Kind::FirstPassage => (format!("first passage of {name}"), "amount"),
+            Kind::Total => (format!("total {name}"), "amount"),
+            Kind::Moments => moment_name(courses[0]),
+            Kind::FirstPassage => (format!("first passage of {name}{}", courses[0].station), "amount"),
             Kind::Dilution => (format!("dilution of {name}"), "dilution index"),
-            _ => (name.clone(), "concentration"),
+            _ => (format!("{name}{}", courses[0].station), "concentration"),
         };
         Panel {
             title,
@@ -200,6 +203,7 @@ impl Story<'_> {
             "point",
             "output",
             "species",
+            "number",
             "time",
             over,
             "n",
@@ -214,6 +218,7 @@ impl Story<'_> {
                     course.point.to_string(),
                     course.output.to_string(),
                     course.name.clone(),
+                    course.number.to_owned(),
                     number(course.t),
                     number(Some(*place)),
                     moments.n.to_string(),
@@ -225,6 +230,15 @@ impl Story<'_> {
             }
         }
         csv.text
+    }
+}
+
+/// The title of a moment, and what it is.
+fn moment_name(course: &Course) -> (String, &'static str) {
+    let axis = course.number.chars().last().unwrap_or('x');
+    match course.number.starts_with("mean") {
+        true => (format!("centre of {} along {axis}", course.name), "centre"),
+        false => (format!("variance of {} along {axis}", course.name), "variance"),
     }
 }
 

@@ -3,6 +3,7 @@
 //! Owns the passes over the large tables. May use `table::scan`. It deliberately keeps one mean per
 //! bin or time of the chosen points: the number of replicates and of other points does not matter.
 
+use super::quantity::with_unit;
 use super::stats::Moments;
 use crate::table::scan::{Row, Selection, parts, scan};
 use crate::table::{Kind, TableError};
@@ -16,6 +17,10 @@ pub struct Course {
     pub point: u32,
     /// A species, or `A, B`.
     pub name: String,
+    /// The column of the table.
+    pub number: &'static str,
+    /// Where it is taken, as ` at x = 80 m`; empty without a place.
+    pub station: String,
     /// Absent if the course is over time.
     pub t: Option<f64>,
     /// 0, 1, 2: the axis it runs along.
@@ -35,25 +40,53 @@ impl Course {
     }
 }
 
-/// Times of curves over a place that are shown, for each point by itself.
+/// The columns of a kind of table that are shown.
+fn numbers_of(kind: Kind) -> &'static [&'static str] {
+    match kind {
+        Kind::Profile | Kind::Map | Kind::Breakthrough => &["concentration"],
+        Kind::Total => &["amount"],
+        Kind::Covariance => &["covariance"],
+        Kind::Mixing => &["gamma"],
+        Kind::FirstPassage => &["cumulative"],
+        Kind::Moments => &["mean_x", "mean_y", "mean_z", "xx", "yy", "zz"],
+        Kind::Dilution => &["index"],
+        _ => &[],
+    }
+}
+
+/// All curves of a kind of table; those without any value are left out.
 pub fn read(folder: &Path, kind: Kind, points: &[u32], most_times: usize) -> Result<Vec<Course>, TableError> {
     let is_over_time = !matches!(kind, Kind::Profile | Kind::Map | Kind::Covariance);
     let times = if is_over_time { BTreeMap::new() } else { times(folder, kind, points, most_times)? };
-    let mut gathered = Gathered { courses: Vec::new(), last: 0, is_over_time, is_pair: false };
-    let (value, words): (&str, &[&str]) = match kind {
-        Kind::Profile | Kind::Map => ("concentration", &["unit", "species"]),
-        Kind::Total => ("amount", &["unit", "species"]),
-        Kind::Covariance => ("covariance", &["unit", "species_a", "species_b"]),
-        Kind::Mixing => ("gamma", &["unit", "species_a", "species_b"]),
-        Kind::Breakthrough => ("concentration", &["unit", "species"]),
-        Kind::FirstPassage => ("cumulative", &["unit", "species"]),
-        Kind::Moments => ("amount", &["unit", "species"]),
-        Kind::Dilution => ("index", &["unit", "species"]),
-        Kind::Particles | Kind::Budget | Kind::Errors | Kind::ErrorBars => return Ok(Vec::new()),
+    let mut courses = Vec::new();
+    for number in numbers_of(kind) {
+        let found = of_number(folder, kind, number, points, &times)?;
+        courses.extend(found.into_iter().filter(|course| course.most_replicates() > 0));
+    }
+    Ok(courses)
+}
+
+/// The times of curves over a place that are shown, by output and point.
+type Times = BTreeMap<(u16, u32), Vec<f64>>;
+
+fn of_number(
+    folder: &Path,
+    kind: Kind,
+    number: &'static str,
+    points: &[u32],
+    times: &Times,
+) -> Result<Vec<Course>, TableError> {
+    let is_over_time = !matches!(kind, Kind::Profile | Kind::Map | Kind::Covariance);
+    let has_place = matches!(kind, Kind::Breakthrough | Kind::FirstPassage);
+    let words: &[&str] = match kind {
+        Kind::Covariance | Kind::Mixing => &["unit", "species_a", "species_b"],
+        _ if has_place => &["unit", "species", "place"],
+        _ => &["unit", "species"],
     };
-    gathered.is_pair = words.len() == 3;
-    let mut numbers = vec!["point", "output", "t", value];
-    if !is_over_time {
+    let is_pair = matches!(kind, Kind::Covariance | Kind::Mixing);
+    let mut gathered = Gathered { courses: Vec::new(), last: 0, number, is_over_time, is_pair, has_place };
+    let mut numbers = vec!["point", "output", "t", number];
+    if !is_over_time || has_place {
         numbers.extend(["x", "y", "z"]);
     }
     for part in parts(folder, kind) {
@@ -74,13 +107,8 @@ pub fn read(folder: &Path, kind: Kind, points: &[u32], most_times: usize) -> Res
 }
 
 /// The times of each output and point that are shown: evenly spread, the last among them.
-fn times(
-    folder: &Path,
-    kind: Kind,
-    points: &[u32],
-    most: usize,
-) -> Result<BTreeMap<(u16, u32), Vec<f64>>, TableError> {
-    let mut found: BTreeMap<(u16, u32), Vec<f64>> = BTreeMap::new();
+fn times(folder: &Path, kind: Kind, points: &[u32], most: usize) -> Result<Times, TableError> {
+    let mut found = Times::new();
     for part in parts(folder, kind) {
         let selection =
             Selection { numbers: &["point", "output", "t"], points: Some(points), ..Selection::default() };
@@ -124,8 +152,10 @@ struct Gathered {
     courses: Vec<Course>,
     /// The course of the row before: the next row mostly belongs to it, too.
     last: usize,
+    number: &'static str,
     is_over_time: bool,
     is_pair: bool,
+    has_place: bool,
 }
 
 impl Gathered {
@@ -143,13 +173,18 @@ impl Gathered {
         if !self.courses.get(self.last).is_some_and(is_mine) {
             self.last = self.courses.iter().position(is_mine).unwrap_or_else(|| {
                 let name = second.as_ref().map_or_else(|| first.to_string(), |b| format!("{first}, {b}"));
-                let unit = match self.is_over_time && self.is_pair {
-                    true => "1".to_owned(),
-                    false => row.word(0).unwrap_or_default().into_owned(),
+                let unit = match self.number {
+                    "gamma" => "1".to_owned(),
+                    "mean_x" | "mean_y" | "mean_z" => "m".to_owned(),
+                    "xx" | "yy" | "zz" => "m^2".to_owned(),
+                    _ => row.word(0).unwrap_or_default().into_owned(),
                 };
+                let station = if self.has_place { station(row) } else { String::new() };
                 let axis = (0..3).find(|axis| row.number(4 + axis).is_some()).unwrap_or(0);
                 let Place { point, output, .. } = place;
-                self.courses.push(Course { output, point, name, t, axis, unit, bins: BTreeMap::new() });
+                let number = self.number;
+                let bins = BTreeMap::new();
+                self.courses.push(Course { output, point, name, number, station, t, axis, unit, bins });
                 self.courses.len() - 1
             });
         }
@@ -160,6 +195,21 @@ impl Gathered {
         };
         let (_, moments) = course.bins.entry(sorted_key(x)).or_insert((x, Moments::default()));
         row.number(3).into_iter().for_each(|value| moments.add(value));
+    }
+}
+
+/// ` at pump`, ` at right`, ` at x = 80 m`
+fn station(row: &Row) -> String {
+    let place = row.word(2).unwrap_or_default();
+    let known = ["x", "y", "z"].iter().enumerate();
+    let known =
+        known.filter_map(|(axis, name)| Some(format!("{name} = {}", with_unit(row.number(4 + axis)?, "m"))));
+    let position = known.collect::<Vec<_>>().join(", ");
+    match &*place {
+        "plane" => format!(" at {position}"),
+        "box" => format!(" in a box around {position}"),
+        part if part.starts_with("part of") => format!(" in a part around {position}"),
+        side => format!(" at {side}"),
     }
 }
 

@@ -56,7 +56,9 @@ pub fn maps(folder: &Path, study: &Study) -> Result<String, TableError> {
         1 => format!("The last time{of}"),
         n => format!("Means{of} over {n} replicates at the last time"),
     };
-    let caption = format!("{what}; grey bins hold no particle.");
+    let is_grey = |map: &Map| map.bins.values().any(|bin| bin.value.n == 0);
+    let grey = if maps.iter().any(is_grey) { "; grey bins hold no particle" } else { "" };
+    let caption = format!("{what}{grey}.");
     Ok(format!("<h3>Maps</h3>\n{}", figure(&svg, &caption)))
 }
 
@@ -110,11 +112,14 @@ fn panel(map: &Map) -> Option<Panel> {
     let middle: Vec<f64> = middle.collect();
     let largest = map.bins.values().map(|bin| bin.value.mean.abs()).fold(0.0, f64::max);
     let value = shown(&map.unit, largest);
+    // A bin without particles has a value only where particles carry mass: none is there. All bins count alike then.
+    let are_masses = map.bins.values().any(|bin| bin.value.n > 0 && bin.n_particles == 0);
     let cell = |i: usize, j: usize| {
         let mut place = [middle[0], middle[1], middle[2]];
         (place[a], place[b]) = (centres[a][i], centres[b][j]);
-        let bin = map.bins.get(&place.map(sorted_key));
-        bin.map_or((f64::NAN, 0), |bin| (bin.value.mean / value.factor, bin.n_particles))
+        let bin = map.bins.get(&place.map(sorted_key)).filter(|bin| bin.value.n > 0);
+        let weight = |bin: &Bin| if are_masses { 1 } else { bin.n_particles };
+        bin.map_or((f64::NAN, 0), |bin| (bin.value.mean / value.factor, weight(bin)))
     };
     // Bins reach half their width beyond the outermost centres.
     let ends = |centres: &[f64]| {
@@ -130,8 +135,13 @@ fn panel(map: &Map) -> Option<Panel> {
         spacing: Spacing::Linear,
     };
     let names = ["x", "y", "z"];
+    // Without its place the cut would read like a mean.
+    let cut: String = axes[2..]
+        .iter()
+        .map(|&axis| format!(", {} = {}", names[axis], with_unit(middle[axis], "m")))
+        .collect();
     Some(Panel {
-        title: format!("{} at {}", map.species, with_unit(map.t, "s")),
+        title: format!("{} at {}{cut}", map.species, with_unit(map.t, "s")),
         x_label: label(names[a], &length),
         y_label: label(names[b], &length),
         x: scale(reach[0]),

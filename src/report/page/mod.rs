@@ -3,6 +3,7 @@
 //! Owns the order of the sections. May use the tables, `sweep.json`, `plan.yaml`, the crate, and the
 //! figures of `report`. It deliberately runs nothing and judges nothing: the same folder gives the same bytes.
 
+mod balance;
 mod bands;
 mod budget;
 mod convergence;
@@ -139,6 +140,7 @@ pub fn report(folder: &Path) -> Result<Page, ReportError> {
     }
     let (html, files) = budget::budget(&study);
     book.add("mass", "Mass budget", html);
+    book.add("mass", "Mass budget", balance::balances(folder, &study)?);
     book.files(files);
     book.failures(&study);
     book.add("left-out", "Left out of the runs", provenance::omissions(&plan));

@@ -13,7 +13,7 @@ pub fn shown(unit: &str, largest: f64) -> Shown {
         "s" => display::time(largest),
         "m" => display::length(largest),
         "" | "1" => Shown { factor: 1.0, text: "–".to_owned() },
-        other => Shown { factor: 1.0, text: display::raised(other) },
+        other => display::of_unit(other, largest),
     }
 }
 

@@ -84,15 +84,18 @@ pub(super) fn expect<'a>(
 ) -> Option<ExpectKind> {
     let order = match &written.value.kind {
         ExprKind::Call { function, arguments } if function.value == "order" => Some(arguments),
+        ExprKind::Call { function, arguments } if function.value == "mean" => {
+            return mean(checker, written, arguments, measures);
+        }
         _ => None,
     };
     let (Some(arguments), Some(range)) = (order, &written.range) else {
         if order.is_some() || written.range.is_some() {
             checker.report(
-                Diagnostic::error(W001, "an order is expected in a range, and nothing else is")
+                Diagnostic::error(W001, "an order or a mean is expected in a range, and nothing else is")
                     .at(written.value.span, "this")
                     .found("one without the other")
-                    .expected("`expect order(measure, axis) in low .. high`, or a condition"),
+                    .expected("`expect order(measure, axis) in low .. high`, `expect mean(measure) in low .. high`, or a condition"),
             );
             return None;
         }
@@ -119,4 +122,33 @@ pub(super) fn expect<'a>(
     let axis = checker.word(axis, "an axis of the sweep", &words);
     let (low, high, _) = checker.range(range, "the expected order", Some(Dimension::NONE))?;
     Some(ExpectKind::Order { measure: measure?, axis: axis?.clone(), low: low.value, high: high.value })
+}
+
+/// `mean(err) in 0.9 .. 1.1`
+fn mean<'a>(
+    checker: &mut Checker<'a>,
+    written: &'a tree::Expect,
+    arguments: &'a [tree::Argument],
+    measures: &[Measure],
+) -> Option<ExpectKind> {
+    let name = match arguments {
+        [tree::Argument { name: None, value }] => match &value.kind {
+            ExprKind::Path(path) => path.first().filter(|_| path.len() == 1),
+            _ => None,
+        },
+        _ => None,
+    };
+    let (Some(name), Some(range)) = (name, &written.range) else {
+        checker.report(
+            Diagnostic::error(W001, "`mean` takes a measure, and is expected in a range")
+                .at(written.value.span, "this")
+                .found("another argument, or no range")
+                .expected("`expect mean(err) in low .. high`"),
+        );
+        return None;
+    };
+    let measure = measure_name(checker, name, measures)?;
+    let dimension = measures.iter().find(|other| other.name == measure)?.dimension;
+    let (low, high, _) = checker.range(range, "the expected mean", Some(dimension))?;
+    Some(ExpectKind::Mean { measure, low: low.value, high: high.value })
 }

@@ -12,6 +12,7 @@ use crate::source::Span;
 
 /// Reports everything that the particles of a scene cannot do.
 pub fn check(checker: &mut Checker<'_>, scenario: &Scenario) {
+    super::super::station::check_wells(checker, scenario);
     if scenario.particles.shares.is_some() {
         of_mass(checker, scenario);
     } else {

@@ -83,9 +83,13 @@ pub(super) fn visit(kind: &mut StatementKind, visitor: &mut impl Visitor) {
 fn output(it: &mut Output, visitor: &mut impl Visitor) {
     expressions(&mut it.grid, visitor);
     match &mut it.place {
-        Some(Place::Plane(_, at)) => expression(at, visitor),
+        Some(Place::Plane(_, at, part)) => {
+            expression(at, visitor);
+            part.iter_mut().for_each(|it| axis(it, visitor));
+        }
+        Some(Place::Side(_, part)) => part.iter_mut().for_each(|it| axis(it, visitor)),
         Some(Place::Box(_, ranges)) => ranges.iter_mut().for_each(|it| range(it, visitor)),
-        Some(Place::Side(_)) | None => {}
+        Some(Place::Well(_)) | None => {}
     }
     match &mut it.times {
         Some(Times::List(list)) => expressions(list, visitor),

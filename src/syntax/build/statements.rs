@@ -367,13 +367,20 @@ impl Clauses {
     }
 }
 
-/// `at x = 10 m` or `at right`
+/// `at x = 10 m`, `at right` or parts of these, or `at well pump`
 fn output_place(parts: &mut Parts) -> Built<tree::Place> {
     if let Some(side) = parts.take(Rule::side) {
-        return Ok(tree::Place::Side(spanned(parts.place, &side)));
+        let part = match parts.take(Rule::patch) {
+            Some(pair) => each(&mut Parts::of(parts.place, pair), Rule::axis, axis)?,
+            None => Vec::new(),
+        };
+        return Ok(tree::Place::Side(spanned(parts.place, &side), part));
     }
-    let name = parts.need(Rule::axis_name)?;
-    Ok(tree::Place::Plane(spanned(parts.place, &name), parts.expression()?))
+    let Some(plane) = parts.take(Rule::plane) else { return Ok(tree::Place::Well(parts.name()?)) };
+    let mut inner = Parts::of(parts.place, plane);
+    let name = inner.need(Rule::axis_name)?;
+    let at = inner.expression()?;
+    Ok(tree::Place::Plane(spanned(inner.place, &name), at, each(&mut inner, Rule::axis, axis)?))
 }
 
 /// The place of the word that a clause begins with.
