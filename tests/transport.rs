@@ -412,9 +412,10 @@ fn particles_follow_a_flow_that_is_solved_for() {
     assert!(outcome.worst_defect() < 1e-12);
     let Values::Particles { positions, .. } = &snapshots[0].values else { panic!() };
     for (x, y) in positions[0].iter().zip(&positions[1]) {
-        // v = K i/φ: 4 m in the lower layer, 2 m in the upper; 32-bit displacements.
+        // v = K i/φ: 4 m in the lower layer, 2 m in the upper; water balances to 1e-13, and heads
+        // are worse by the condition of 500 cells at most, 1e4.
         let exact = 1.0 + if *y < 0.5 { 4.0 } else { 2.0 };
-        assert!((x - exact).abs() < 1e-5, "{x} at {y}");
+        assert!((x - exact).abs() < 1e-8, "{x} at {y}");
     }
 }
 

@@ -16,7 +16,9 @@ pub(super) fn lines(plan: &Plan) -> Vec<String> {
     let Some(transport) = &plan.transport else { return Vec::new() };
     let mut lines = flow_lines(plan, &transport.flow);
     lines.push(dispersion_line(&transport.dispersion));
+    lines.extend(path_line(plan, transport));
     lines.push(format!("porosity: {}", tape(&transport.porosity, "")));
+    lines.extend(cell_line(transport));
     for interface in &transport.interfaces {
         let axis = plan.axes.get(interface.axis).map_or("", |axis| axis_name(axis.index));
         lines.push(format!("coefficients jump at {axis} = {} m", number(interface.at)));
@@ -170,6 +172,32 @@ fn dispersion_line(dispersion: &Dispersion) -> String {
             number(*molecular)
         ),
     }
+}
+
+/// What follows the flow on cells without spreading.
+fn path_line(plan: &Plan, transport: &Transport) -> Option<String> {
+    let molecular = match &transport.dispersion {
+        Dispersion::Velocity { longitudinal, transverse, transverse_vertical, molecular }
+            if [longitudinal, transverse, transverse_vertical].into_iter().all(|length| *length == 0.0) =>
+        {
+            *molecular
+        }
+        Dispersion::Constant(triangle) if triangle.iter().all(|entry| *entry == 0.0) => 0.0,
+        _ => return None,
+    };
+    let is_on_cells = matches!(transport.flow, Flow::Darcy(_) | Flow::File(_));
+    let still =
+        transport.populations.iter().filter(|of| of.is_mobile && of.molecular.unwrap_or(molecular) == 0.0);
+    let names: Vec<&str> = still.map(|of| name(plan, of.species)).collect();
+    let says = |names: &str| format!("paths: {names} exactly with the water from cell to cell, at any step");
+    (is_on_cells && !names.is_empty()).then(|| says(&names.join(", ")))
+}
+
+/// What porosity that varies means on cells.
+fn cell_line(transport: &Transport) -> Option<String> {
+    let is_on_cells = matches!(transport.flow, Flow::Darcy(_));
+    let varies = !matches!(transport.porosity.operations[..], [Operation::Constant(_)]);
+    (is_on_cells && varies).then(|| "  each cell has that of its middle; faces between are jumps".to_owned())
 }
 
 fn side_lines(plan: &Plan, transport: &Transport, lines: &mut Vec<String>) {

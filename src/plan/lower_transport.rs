@@ -5,6 +5,7 @@
 
 use super::Axis;
 use super::build_tape::build_tape;
+use super::burnett_frind::uniform_tensor;
 use super::lower::too_large;
 use super::lower_chemistry::Network;
 use super::shares;
@@ -65,38 +66,6 @@ pub(super) fn constant(value: f64) -> Tape {
     Tape { operations: vec![Operation::Constant(value)] }
 }
 
-/// Tensor of constant dispersion in a uniform flow, m²/s.
-///
-/// - Equation: `D = |v| (α_L n nᵀ + Σ_k α_k t_k t_kᵀ) + D_m I` in the form of Burnett and Frind, with a
-///   transverse length of its own for what is vertical.
-/// - Symbols: `n = v/|v|`; α lengths along, across and vertically across the flow; `D_m` molecular.
-/// - Range: any velocity; without flow the molecular part is left.
-/// - Source: R. D. Burnett, E. O. Frind (1987), Water Resources Research 23(4), 695.
-/// - Shape: 3 × 3, x, y, z.
-pub(super) fn uniform_tensor(velocity: [f64; 3], [along, across, vertical, own]: [f64; 4]) -> [[f64; 3]; 3] {
-    let speed = velocity.iter().map(|v| v * v).sum::<f64>().sqrt();
-    let n = if speed > 0.0 { velocity.map(|v| v / speed) } else { [0.0; 3] };
-    let square = n.map(|n| n * n);
-    let mut tensor = [[0.0; 3]; 3];
-    for i in 0..3 {
-        for j in 0..3 {
-            let is_vertical = i == 2 || j == 2;
-            let other = if is_vertical { vertical } else { across };
-            let part = if i == j {
-                let mut sum = along * square[i];
-                for k in (0..3).filter(|&k| k != i) {
-                    sum += if i == 2 || k == 2 { vertical } else { across } * square[k];
-                }
-                sum
-            } else {
-                (along - other) * n[i] * n[j]
-            };
-            tensor[i][j] = speed * part + if i == j { own } else { 0.0 };
-        }
-    }
-    tensor
-}
-
 /// What one unit of each species adds to the components, and how many of these there are.
 type Totals<'a> = (&'a [Vec<(usize, f64)>], usize);
 
@@ -120,7 +89,10 @@ impl Lowering<'_> {
         let sources = self.scenario.sources.iter().map(|source| self.source(source)).collect();
         let is_of_fluid = self.totals.is_some();
         let populations = if is_of_fluid { Vec::new() } else { self.populations(own)? };
-        let interfaces = self.interfaces(&dispersion, &porosity);
+        let is_on_cells = matches!(flow, Flow::Darcy(_) | Flow::File(_));
+        // Cells have porosities of their own, and faces between them.
+        let of_porosity = Some(&porosity).filter(|_| !is_on_cells);
+        let interfaces = self.interfaces(&dispersion, of_porosity);
         let mut transport = Transport {
             flow,
             dispersion,
@@ -365,10 +337,10 @@ impl Lowering<'_> {
     }
 
     /// Planes at which a comparison of a coordinate with a number switches dispersion or porosity.
-    fn interfaces(&self, dispersion: &Dispersion, porosity: &Tape) -> Vec<Interface> {
+    fn interfaces(&self, dispersion: &Dispersion, porosity: Option<&Tape>) -> Vec<Interface> {
         let of_dispersion = if let Dispersion::Isotropic(tape) = dispersion { Some(tape) } else { None };
         let mut list: Vec<Interface> = Vec::new();
-        for tape in of_dispersion.into_iter().chain([porosity]) {
+        for tape in of_dispersion.into_iter().chain(porosity) {
             for (input, at) in tape.operations.iter().filter_map(|operation| threshold(tape, operation)) {
                 let Some(axis) = self.axes.iter().position(|axis| axis.index == usize::from(input)) else {
                     continue;

@@ -5,6 +5,7 @@
 
 mod auto_step;
 pub mod build_tape;
+pub mod burnett_frind;
 mod check;
 mod check_chemistry;
 mod check_transport;

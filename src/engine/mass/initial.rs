@@ -13,7 +13,7 @@ impl<const D: usize> Site<'_, D> {
     pub fn initial(&self, population: usize) -> Result<Part<D>, RunError> {
         let of = &self.transport.populations[population];
         let cells = Cells::new(self.low, self.high, |centres| {
-            let porosity = self.evaluate(&self.transport.porosity, centres, 0.0);
+            let porosity = self.porosity(centres);
             let values = self.evaluate(&of.initial, centres, 0.0);
             porosity.iter().zip(values).map(|(porosity, c)| porosity * of.retardation * c).collect()
         });

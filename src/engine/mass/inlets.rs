@@ -45,7 +45,7 @@ impl<const D: usize> Site<'_, D> {
             let area: f64 =
                 (0..D).filter(|&other| other != axis).map(|other| high[other] - low[other]).product();
             let c = self.evaluate(tape, &[centre], 0.0)[0];
-            let porosity = self.evaluate(&self.transport.porosity, &[centre], 0.0)[0];
+            let porosity = self.porosity(&[centre])[0];
             let inwards = sign * tracker.medium.velocity(centre, axis);
             if !is_held {
                 flux.push((low, high, c * porosity * area * inwards.max(0.0)));
@@ -126,7 +126,7 @@ impl<const D: usize> Site<'_, D> {
     ) -> Vec<f64> {
         let is_constant = |tape: &Tape| matches!(tape.operations[..], [Operation::Constant(_)]);
         let is_even = is_constant(tape)
-            && is_constant(&self.transport.porosity)
+            && !self.has_smooth_pores()
             && !matches!(self.transport.flow, Flow::Expression(_))
             && !matches!(self.transport.dispersion, Dispersion::Isotropic(_));
         let n = if is_even { 1 } else { cuts[usize::from(D > 2)] };

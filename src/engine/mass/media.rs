@@ -8,12 +8,15 @@ use super::super::program::unsound;
 use super::super::snapshot::Outcome;
 use super::super::track::cells::{CellMedium, Dispersivity};
 use super::super::track::formula::{Formula, Spreading};
-use super::super::track::medium::Medium;
+use super::super::track::medium::{Carrier, Medium};
+use super::super::track::paths::{Pathed, Paths};
+use super::super::track::uneven::{Blend, Lengths, UnevenMedium};
 use super::super::track::uniform::Uniform;
 use super::run::{Sink, go};
 use super::world::Site;
 use crate::flow::{FaceFlow, build};
 use crate::plan::Plan;
+use crate::plan::burnett_frind::uniform_tensor;
 use crate::plan::tape::{Operation, Tape};
 use crate::plan::transport::{Dispersion, Flow};
 use std::sync::Arc;
@@ -74,17 +77,56 @@ pub fn in_medium<const D: usize, W: InMedium<D>>(site: &Site<D>, what: W) -> Res
         (Flow::Uniform(_) | Flow::Expression(_), _) => what.go(site, formula(site)?),
         (
             Flow::Darcy(_) | Flow::File(_),
-            Dispersion::Velocity { longitudinal, transverse, molecular, .. },
+            Dispersion::Velocity { longitudinal, transverse, transverse_vertical, molecular },
         ) => {
+            let lengths = Lengths {
+                longitudinal: *longitudinal,
+                transverse: *transverse,
+                vertical: (D == 3).then_some(*transverse_vertical).filter(|vertical| vertical != transverse),
+                molecular: *molecular,
+            };
+            on_cells(site, lengths, what)
+        }
+        (Flow::Darcy(_) | Flow::File(_), Dispersion::Constant(triangle))
+            if triangle.iter().all(|entry| *entry == 0.0) =>
+        {
+            let none = Lengths { longitudinal: 0.0, transverse: 0.0, vertical: None, molecular: 0.0 };
+            on_cells(site, none, what)
+        }
+        (Flow::Darcy(_) | Flow::File(_), Dispersion::Constant(_) | Dispersion::Isotropic(_)) => {
+            let none = Lengths { longitudinal: 0.0, transverse: 0.0, vertical: None, molecular: 0.0 };
             let flow = site.flow.as_ref().ok_or_else(|| unsound("a flow that nobody solved"))?;
             let axes = std::array::from_fn(|axis| plan.axes[axis].index);
-            let dispersivity =
-                Dispersivity { longitudinal: *longitudinal, transverse: *transverse, molecular: *molecular };
-            let medium = CellMedium::<D>::new(flow, axes, dispersivity)
-                .ok_or_else(|| unsound("cells that are not equal, or porosity that varies"))?;
-            what.go(site, medium)
+            let cells = UnevenMedium::<D>::new(flow, axes, none);
+            what.go(site, Blend { cells, spreading: formula(site)? })
         }
-        _ => Err(unsound("flow and dispersion that do not go together yet")),
+    }
+}
+
+/// A walk on cells: those that are equal in everything have the faster way.
+fn on_cells<const D: usize, W: InMedium<D>>(
+    site: &Site<D>,
+    lengths: Lengths,
+    what: W,
+) -> Result<W::Output, RunError> {
+    let flow = site.flow.as_ref().ok_or_else(|| unsound("a flow that nobody solved"))?;
+    let axes = std::array::from_fn(|axis| site.plan.axes[axis].index);
+    let Lengths { longitudinal, transverse, vertical, molecular } = lengths;
+    let is_still = [longitudinal, transverse, vertical.unwrap_or(0.0)].iter().all(|length| *length == 0.0);
+    let follows_paths = |carrier: Carrier| carrier.molecular.unwrap_or(molecular) == 0.0;
+    // Parcels of water, which are no carriers, touch walls on their way and walk in steps.
+    if is_still && site.carriers().into_iter().any(follows_paths) {
+        let paths = Paths::new(flow, axes, &site.drains());
+        let medium = UnevenMedium::<D>::new(flow, axes, lengths);
+        return what.go(site, Pathed { medium, paths, molecular });
+    }
+    let even = match vertical {
+        None => CellMedium::<D>::new(flow, axes, Dispersivity { longitudinal, transverse, molecular }),
+        Some(_) => None,
+    };
+    match even {
+        Some(medium) => what.go(site, medium),
+        None => what.go(site, UnevenMedium::<D>::new(flow, axes, lengths)),
     }
 }
 
@@ -98,22 +140,29 @@ fn formula<const D: usize>(site: &Site<D>) -> Result<Formula<D>, RunError> {
     let velocity: Vec<Tape> = match &site.transport.flow {
         Flow::Uniform(velocity) => velocity.iter().map(|&v| constant(v)).collect(),
         Flow::Expression(tapes) => tapes.clone(),
-        Flow::Darcy(_) | Flow::File(_) => return Err(unsound("a flow without expressions")),
+        // Cells have the velocity, and the porosity.
+        Flow::Darcy(_) | Flow::File(_) => vec![constant(0.0); D],
     };
     let spreading = match &site.transport.dispersion {
         Dispersion::Constant(triangle) => Spreading::Constant(triangle_of(triangle)?, 0.0),
         Dispersion::Isotropic(tape) => Spreading::Isotropic(tape.clone()),
-        Dispersion::Velocity { longitudinal, transverse, molecular, .. } => Spreading::Velocity {
-            longitudinal: *longitudinal,
-            transverse: *transverse,
-            molecular: *molecular,
-        },
+        Dispersion::Velocity { longitudinal, transverse, transverse_vertical, molecular } => {
+            Spreading::Velocity {
+                longitudinal: *longitudinal,
+                transverse: *transverse,
+                transverse_vertical: *transverse_vertical,
+                molecular: *molecular,
+            }
+        }
     };
     Ok(Formula {
         axes: std::array::from_fn(|axis| site.plan.axes[axis].index),
         velocity: velocity.try_into().map_err(|_| unsound("a velocity that does not fit the axes"))?,
         spreading,
-        porosity: site.transport.porosity.clone(),
+        porosity: match site.flow {
+            Some(_) => constant(1.0),
+            None => site.transport.porosity.clone(),
+        },
         width: std::array::from_fn(|axis| site.high[axis] - site.low[axis]),
     })
 }
@@ -140,6 +189,16 @@ fn uniform<const D: usize>(
     let mut own = 0.0;
     match dispersion {
         Dispersion::Constant(triangle) => tensor = triangle_of(triangle)?,
+        Dispersion::Velocity { longitudinal, transverse, transverse_vertical, molecular }
+            if D == 3 && transverse != transverse_vertical =>
+        {
+            own = *molecular;
+            let along = std::array::from_fn(|axis| velocity[axis]);
+            let all = uniform_tensor(along, [*longitudinal, *transverse, *transverse_vertical, own]);
+            for i in 0..D {
+                tensor[i][..=i].copy_from_slice(&all[i][..=i]);
+            }
+        }
         Dispersion::Velocity { longitudinal, transverse, molecular, .. } => {
             let speed = velocity.iter().map(|v| v * v).sum::<f64>().sqrt();
             own = *molecular;

@@ -16,6 +16,7 @@ mod observe;
 mod order;
 mod parts;
 pub(super) mod place;
+mod pores;
 pub(super) mod release;
 mod run;
 mod shape;

@@ -64,8 +64,7 @@ impl<const D: usize> Scene<'_, D> {
     fn binned(&self, output: &Output) -> Result<Values, RunError> {
         let grid = self.grid(output).ok_or_else(|| unsound("an output whose bins do not make a grid"))?;
         let bins = grid.bins();
-        let centres: Vec<[f64; D]> = (0..grid.n_bins()).map(|bin| grid.centre(bin)).collect();
-        let porosity = self.site.evaluate(&self.site.transport.porosity, &centres, 0.0);
+        let porosity = self.site.porosity_of_bins(&grid);
         let volume: f64 =
             (0..D).map(|axis| (self.site.high[axis] - self.site.low[axis]) / bins[axis] as f64).product();
         let mut mean = Vec::new();

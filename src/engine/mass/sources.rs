@@ -68,7 +68,7 @@ impl<const D: usize> Site<'_, D> {
         };
         let carrier = self.carriers()[population];
         let centre: [f64; D] = std::array::from_fn(|axis| 0.5 * (low[axis] + high[axis]));
-        let porosity = self.evaluate(&self.transport.porosity, &[centre], 0.0)[0];
+        let porosity = self.porosity(&[centre])[0];
         let density = c * porosity * self.transport.populations[population].retardation;
         let volume =
             |low: &[f64; D], high: &[f64; D]| -> f64 { (0..D).map(|axis| high[axis] - low[axis]).product() };

@@ -1,4 +1,4 @@
-//! Water through planes and sides, and in boxes.
+//! Water through planes and sides.
 //!
 //! Owns these sums. May use `flow`, media and the plan. It deliberately looks at no particle.
 
@@ -77,22 +77,6 @@ impl<const D: usize> Site<'_, D> {
             .map(|(&place, porosity)| porosity * medium.velocity(place, axis))
             .sum();
         sum / n as f64 * area
-    }
-
-    /// Mean porosity in a box, by the midpoint rule.
-    pub fn porosity_in(&self, low: &[f64; D], high: &[f64; D]) -> f64 {
-        let per_axis = if D == 3 { POINTS / 4 } else { POINTS };
-        let n = per_axis.pow(D as u32);
-        let places: Vec<[f64; D]> = (0..n)
-            .map(|mut idx| {
-                std::array::from_fn(|axis| {
-                    let part = ((idx % per_axis) as f64 + 0.5) / per_axis as f64;
-                    idx /= per_axis;
-                    low[axis] + part * (high[axis] - low[axis])
-                })
-            })
-            .collect();
-        self.evaluate(&self.transport.porosity, &places, 0.0).iter().sum::<f64>() / n as f64
     }
 }
 

@@ -3,8 +3,10 @@
 //! Owns the chance of a particle to leave with that water. May use lanes and the draws. It deliberately knows no
 //! well: a drain is a box in which water vanishes at a rate.
 
-use super::lanes::Lanes;
-use super::medium::Medium;
+#![allow(clippy::needless_range_loop)] // Loops over lanes are hot.
+
+use super::lanes::{LANES, Lane, Lanes};
+use super::medium::{Carrier, Medium};
 use super::walls::{Exit, Stride};
 use crate::maths::scalar::exp;
 
@@ -13,10 +15,12 @@ const WHAT: u64 = 8;
 
 /// A box from which water is taken.
 ///
-/// - Equation: a particle that is in it leaves within Δt with the chance `1 − exp(−λ Δt/R)`, `λ = Q/(φ V)`.
+/// - Equation: a particle leaves within Δt with the chance `1 − exp(−λ Δt/R)`, `λ = Q/(φ V)`, if it begins and ends
+///   in the box, and with that of half the time if it does one of both.
 /// - Symbols: `Q` water taken out, `φ V` water in the box, `R` retardation.
-/// - Range: any step; the box acts as if it were mixed, as a cell of the flow is.
-/// - Source: `d(φ R V c)/dt = −Q c`.
+/// - Range: any step; right to the square of `λ Δt`, where water flows in and out of the box. It acts as if it were
+///   mixed, as a cell of the flow is.
+/// - Source: `d(φ R V c)/dt = −Q c`; the trapezoidal rule for the time inside.
 /// - Shape: one box.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Drain<const D: usize> {
@@ -29,6 +33,31 @@ pub struct Drain<const D: usize> {
 }
 
 impl<const D: usize> Drain<D> {
+    /// One bit for each lane that is in the box.
+    #[inline(always)]
+    fn inside(&self, positions: &[Lane; D]) -> u64 {
+        let mut inside = u64::MAX;
+        for axis in 0..D {
+            let (low, high) = (self.low[axis], self.high[axis]);
+            let of_axis = positions[axis].iter().enumerate();
+            inside &= of_axis.fold(0, |mask, (lane, &x)| mask | u64::from(x >= low && x < high) << lane);
+        }
+        inside
+    }
+
+    /// Shortens displacements in the box to a share of the time that its water stays: velocities change by as
+    /// much.
+    #[inline(always)]
+    pub fn limit(&self, carrier: &Carrier, share: f64, positions: &[Lane; D], time: &mut Lane) {
+        let longest = share / (self.rate * carrier.mobility);
+        let inside = self.inside(positions);
+        for lane in 0..LANES {
+            if inside >> lane & 1 == 1 && time[lane] > longest {
+                time[lane] = longest;
+            }
+        }
+    }
+
     /// Takes out what leaves at the end of a displacement.
     #[inline(always)]
     pub fn apply<M: Medium<D>>(
@@ -38,16 +67,14 @@ impl<const D: usize> Drain<D> {
         lanes: &mut Lanes<D>,
         exits: &mut Vec<Exit>,
     ) {
-        let mut inside = lanes.occupied() & !lanes.gone;
-        for axis in 0..D {
-            let (low, high) = (self.low[axis], self.high[axis]);
-            let of_axis = lanes.positions[axis].iter().enumerate();
-            inside &= of_axis.fold(0, |mask, (lane, &x)| mask | u64::from(x >= low && x < high) << lane);
-        }
-        while inside != 0 {
-            let lane = inside.trailing_zeros() as usize;
-            inside &= inside - 1;
-            let stays = exp(-self.rate * stride.carrier.mobility * stride.leap.time[lane]);
+        let before = self.inside(stride.before);
+        let after = self.inside(&lanes.positions);
+        let mut near = (before | after) & lanes.occupied() & !lanes.gone;
+        while near != 0 {
+            let lane = near.trailing_zeros() as usize;
+            near &= near - 1;
+            let part = if before & after & (1 << lane) == 0 { 0.5 } else { 1.0 };
+            let stays = exp(-self.rate * stride.carrier.mobility * part * stride.leap.time[lane]);
             let uniforms = stride.draws.uniforms(lanes.ids[lane], stride.step, WHAT);
             if uniforms[idx % uniforms.len()] > stays {
                 lanes.gone |= 1 << lane;

@@ -18,7 +18,7 @@ pub enum Spreading<const D: usize> {
     /// The same in all directions, m²/s, over the place.
     Isotropic(Tape),
     /// Lengths, m, and molecular diffusion, m²/s.
-    Velocity { longitudinal: f64, transverse: f64, molecular: f64 },
+    Velocity { longitudinal: f64, transverse: f64, transverse_vertical: f64, molecular: f64 },
 }
 
 /// A medium by expressions.
@@ -42,6 +42,16 @@ pub struct Look<const D: usize> {
     spread: [[Lane; D]; D],
     registers: Vec<Dual<D>>,
     velocity: [Dual<D>; D],
+}
+
+impl<const D: usize> Look<D> {
+    /// Dispersion tensor of a lane, over R, m²/s.
+    pub fn tensor(&self, lane: usize) -> [[f64; D]; D] {
+        let entry = |i: usize, j: usize| -> f64 {
+            (0..=i.min(j)).map(|k| 0.5 * self.spread[i][k][lane] * self.spread[j][k][lane]).sum()
+        };
+        std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)))
+    }
 }
 
 impl<const D: usize> Formula<D> {
@@ -84,10 +94,17 @@ impl<const D: usize> Formula<D> {
                     }
                 }
             }
-            Spreading::Velocity { longitudinal, transverse, molecular } => {
+            Spreading::Velocity { longitudinal, transverse, transverse_vertical, molecular } => {
                 let molecular = carrier.molecular.unwrap_or(*molecular);
+                // Only in space two directions across the flow can differ.
+                let across = if D == 3 { *transverse_vertical } else { *transverse };
                 for lane in 0..LANES {
-                    along_flow(look, lane, [*longitudinal, *transverse, molecular], &mut tensor);
+                    along_flow(look, lane, [*longitudinal, across, molecular], &mut tensor);
+                }
+                if across != *transverse {
+                    for lane in 0..LANES {
+                        on_the_level(look, lane, transverse - across, &mut tensor);
+                    }
                 }
             }
         }
@@ -126,6 +143,37 @@ fn along_flow<const D: usize>(
     for i in 0..D {
         look.drift[i][lane] += drift[i];
     }
+}
+
+/// What the length on the level across the flow adds to that upwards across it, at one lane.
+///
+/// - Equation: `E = γ T/V`, `T = [[v_y², −v_x v_y], [−v_x v_y, v_x²]]` on the level; its divergence by the product rule.
+/// - Symbols: `γ = α_H − α_V`, `V = |v|`.
+/// - Range: any velocity.
+/// - Source: R. D. Burnett, E. O. Frind (1987), Water Resources Research 23(4), 695.
+/// - Shape: 3 × 3; only x and y have entries.
+fn on_the_level<const D: usize>(look: &mut Look<D>, lane: usize, excess: f64, tensor: &mut [[Lane; D]; D]) {
+    let mut v = [0.0; D];
+    for i in 0..D {
+        v[i] = look.velocity[i].value[lane];
+    }
+    let speed = v.iter().map(|v| v * v).sum::<f64>().sqrt();
+    if speed == 0.0 {
+        return;
+    }
+    let slope = |i: usize, j: usize| look.velocity[i].slopes[j][lane];
+    let rise = |j: usize| (0..D).map(|k| v[k] * slope(k, j)).sum::<f64>() / speed;
+    let (x, y) = (v[0] / speed, v[1] / speed);
+    let (by_x, by_y) = (rise(0), rise(1));
+    let factor = excess * speed;
+    tensor[0][0][lane] += factor * y * y;
+    tensor[1][1][lane] += factor * x * x;
+    tensor[0][1][lane] -= factor * x * y;
+    tensor[1][0][lane] -= factor * x * y;
+    let of_x = 2.0 * y * slope(1, 0) - x * slope(1, 1) - y * slope(0, 1) - y * y * by_x + x * y * by_y;
+    let of_y = 2.0 * x * slope(0, 1) - x * slope(1, 0) - y * slope(0, 0) - x * x * by_y + x * y * by_x;
+    look.drift[0][lane] += excess * of_x;
+    look.drift[1][lane] += excess * of_y;
 }
 
 impl<const D: usize> Medium<D> for Formula<D> {
@@ -234,6 +282,78 @@ fn root<const D: usize>(tensor: &[[Lane; D]; D], factor: f64, lane: usize, sprea
             } else {
                 0.0
             };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::burnett_frind::uniform_tensor;
+    use crate::plan::tape::Binary;
+
+    const LENGTHS: [f64; 4] = [1.0, 0.3, 0.02, 0.001];
+
+    /// `a + b s t` of two inputs.
+    fn tape(a: f64, b: f64, [s, t]: [u16; 2]) -> Tape {
+        let operations = vec![
+            Operation::Input(s),
+            Operation::Input(t),
+            Operation::Constant(b),
+            Operation::Binary(Binary::Multiply, 0, 1),
+            Operation::Binary(Binary::Multiply, 3, 2),
+            Operation::Constant(a),
+            Operation::Binary(Binary::Add, 4, 5),
+        ];
+        Tape { operations }
+    }
+
+    fn medium(a: [f64; 3], b: [f64; 3]) -> Formula<3> {
+        let velocity = [tape(a[0], b[0], [1, 2]), tape(a[1], b[1], [0, 2]), tape(a[2], b[2], [0, 1])];
+        let [longitudinal, transverse, transverse_vertical, molecular] = LENGTHS;
+        let spreading = Spreading::Velocity { longitudinal, transverse, transverse_vertical, molecular };
+        let porosity = Tape { operations: vec![Operation::Constant(0.3)] };
+        Formula { axes: [0, 1, 2], velocity, spreading, porosity, width: [1.0; 3] }
+    }
+
+    fn velocity([x, y, z]: [f64; 3], a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+        [a[0] + b[0] * y * z, a[1] + b[1] * x * z, a[2] + b[2] * x * y]
+    }
+
+    /// Reference: the tensor of the plan, at upright, level, oblique and no flow; its divergence by differences over
+    /// 1e-5, which are right to the square of that.
+    #[test]
+    fn two_lengths_across_the_flow_give_the_tensor_of_burnett_and_frind() {
+        let bent = [0.3, -0.7, 0.4];
+        for (a, b) in [
+            ([1.0, 0.5, -0.7], bent),
+            ([0.0, 0.0, 2.0], [0.0; 3]),
+            ([0.0, 0.0, -1.0], [0.0; 3]),
+            ([0.0; 3], [0.0; 3]),
+            ([-0.2, 1.5, 0.01], bent),
+        ] {
+            let medium = medium(a, b);
+            let place = [0.4, -0.6, 0.9];
+            let mut look = medium.blank();
+            medium.look(&Carrier::WATER, &place.map(|x| [x; LANES]), &mut look);
+            let v = velocity(place, a, b);
+            let exact = uniform_tensor(v, LENGTHS);
+            let h = 1e-5;
+            for i in 0..3 {
+                let mut drift = v[i];
+                for j in 0..3 {
+                    let root = |row: usize, k: usize| look.spread[row][k][5];
+                    let found: f64 = (0..=i.min(j)).map(|k| 0.5 * root(i, k) * root(j, k)).sum();
+                    assert!((found - exact[i][j]).abs() < 1e-13, "{v:?} {i} {j}");
+                    let at = |offset: f64| {
+                        let mut place = place;
+                        place[j] += offset;
+                        uniform_tensor(velocity(place, a, b), LENGTHS)[i][j]
+                    };
+                    drift += (at(h) - at(-h)) / (2.0 * h);
+                }
+                assert!((look.drift[i][5] - drift).abs() < 1e-9, "{v:?} {i}: {} {drift}", look.drift[i][5]);
+            }
         }
     }
 }

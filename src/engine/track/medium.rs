@@ -5,7 +5,9 @@
 
 #![allow(clippy::needless_range_loop)] // Loops over lanes are hot.
 
-use super::lanes::{LANES, Lane, Narrow};
+use super::lanes::{LANES, Lane, Lanes, Narrow};
+use super::paths::Paths;
+use super::walls::Stride;
 
 /// What of a population changes its walk.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -80,6 +82,20 @@ pub trait Medium<const D: usize>: Sync {
 
     /// Adds the displacements.
     fn displace(&self, look: &Self::Look, leap: &Leap, normals: [&Lane; D], positions: &mut [Lane; D]);
+
+    /// Exact paths of a carrier that does not spread, where the medium knows them.
+    #[inline(always)]
+    fn paths(&self, _: &Carrier) -> Option<&Paths<D>> {
+        None
+    }
+
+    /// Mends displacements that went over a jump of the coefficients; a medium without jumps has none.
+    #[inline(always)]
+    fn settle(&self, _: &Stride<D, Self>, _: &mut Lanes<D>)
+    where
+        Self: Sized,
+    {
+    }
 
     /// `2 D_nn` normal to an axis, m²/s.
     fn spread_along(&self, look: &Self::Look, axis: usize, spread: &mut Lane);

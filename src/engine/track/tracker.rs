@@ -104,6 +104,9 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
         bench: &mut Bench<D, M>,
         events: &mut impl Events,
     ) -> Result<(), TooManySubSteps> {
+        if let Some(paths) = self.medium.paths(carrier) {
+            return self.follow(paths, carrier, steps, entered, bench, events);
+        }
         bench.normals.clear();
         if self.criteria.is_none() {
             bench.leap.assign(&[steps.dt; LANES]);
@@ -157,6 +160,9 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
         for sub_step in 0..MOST_SUB_STEPS {
             self.medium.look(carrier, &bench.lanes.positions, &mut bench.look);
             self.medium.longest(&bench.look, criteria, &mut time);
+            for drain in &self.drains {
+                drain.limit(carrier, criteria.courant, &bench.lanes.positions, &mut time);
+            }
             let start: Lane = left.map(|left| t + dt - left);
             let mut is_going = 0_u64;
             for lane in 0..LANES {
@@ -206,6 +212,7 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
             draws: &self.draws,
             step: number,
         };
+        self.medium.settle(&stride, lanes);
         for (idx, interface) in self.interfaces.iter().enumerate() {
             interface.apply(idx, &stride, lanes);
         }

@@ -321,6 +321,9 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
             self.medium.look(carrier, &bench.lanes.positions, &mut bench.look);
             if let Some(criteria) = &self.criteria {
                 self.medium.longest(&bench.look, criteria, &mut fates.most);
+                for drain in &self.drains {
+                    drain.limit(carrier, criteria.courant, &bench.lanes.positions, &mut fates.most);
+                }
             }
             if fates.number != Some(number / 8) {
                 fates.number = Some(number / 8);

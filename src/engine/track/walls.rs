@@ -307,7 +307,7 @@ impl<const D: usize> Wall<D> {
 
 impl<const D: usize> Patch<D> {
     /// Whether a place of the wall belongs to this part of it.
-    fn holds(&self, place: &[f64; D], axis: usize) -> bool {
+    pub(super) fn holds(&self, place: &[f64; D], axis: usize) -> bool {
         (0..D).all(|other| {
             other == axis || (place[other] >= self.low[other] && place[other] <= self.high[other])
         })
