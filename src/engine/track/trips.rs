@@ -95,13 +95,16 @@ pub fn fitting(stops: [Stop; 2], time: f64, walk: f64) -> Option<f64> {
     let waits = stops.map(|stop| stop.wait());
     let ways = [waits[0] * stops[0].mobility, waits[1] * stops[1].mobility];
     let most = |[a, b]: [f64; 2], whole: f64| {
+        // Also where a mean is beyond numbers.
+        if FEWEST * (a + b) > whole {
+            return 0.0;
+        }
         let (mean, spread) = (a + b, MARGIN * (a * a + b * b).sqrt());
         let root = (-spread + (spread * spread + 4.0 * mean * whole).sqrt()) / (2.0 * mean);
         root * root
     };
     let by_walk = if walk.is_finite() && ways[0] + ways[1] > 0.0 { most(ways, walk) } else { MOST };
     let n = most(waits, time).min(by_walk).min(MOST).floor();
-    // Not a number, where times are beyond numbers, is none.
     (n >= FEWEST).then_some(n)
 }
 
