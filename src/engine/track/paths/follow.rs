@@ -21,7 +21,7 @@ const MOST_CELLS: u64 = 1 << 24;
 struct Surroundings<'a, const D: usize> {
     paths: &'a Paths<D>,
     ends: &'a [Ends<D>; D],
-    planes: &'a [Plane],
+    planes: &'a [Plane<D>],
     draws: &'a Draws,
     /// 1/R
     mobility: f64,
@@ -116,6 +116,12 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
                 if let Hop::Gone { side, patch } = end {
                     bench.lanes.gone |= 1 << lane;
                     let fraction = 1.0 - trip.left / steps.dt;
+                    for (idx, gap) in self.gaps.iter().enumerate() {
+                        if gap.side == side && gap.part.holds(side / 2, |axis| trip.x[axis]) {
+                            let crossing = Crossing { lane, is_forward: true, fraction };
+                            events.crossed(id, planes.len() + idx, crossing, time(trip.left));
+                        }
+                    }
                     events.left(id, Exit { lane, side, patch, fraction }, time(trip.left));
                     break;
                 }
@@ -222,8 +228,11 @@ impl<const D: usize> Surroundings<'_, D> {
         for (number, plane) in self.planes.iter().enumerate() {
             let (from, to) = (trip.x[plane.axis], to[plane.axis]);
             if (from < plane.at) != (to < plane.at) {
-                let after = clock(legs[plane.axis].time_to(plane.at).min(linear));
-                crossed(number, to > from, trip.left - after);
+                let time = legs[plane.axis].time_to(plane.at).min(linear);
+                let at = |axis: usize| legs[axis].after(time);
+                if plane.part.as_ref().is_none_or(|part| part.holds(plane.axis, at)) {
+                    crossed(number, to > from, trip.left - clock(time));
+                }
             }
         }
         trip.x = to;
@@ -310,7 +319,11 @@ impl<const D: usize> Surroundings<'_, D> {
         let wall = match &self.ends[axis] {
             Ends::Periodic { low, high } => {
                 for (number, plane) in self.planes.iter().enumerate() {
-                    if plane.axis == axis && plane.at == *low {
+                    let holds = || {
+                        let part = plane.part.as_ref();
+                        part.is_none_or(|part| part.holds(axis, |other| trip.x[other]))
+                    };
+                    if plane.axis == axis && plane.at == *low && holds() {
                         crossed(number, end == 1, trip.left);
                     }
                 }

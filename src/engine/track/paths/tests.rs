@@ -67,6 +67,7 @@ fn tracker(flow: &FaceFlow, laws: [[Law; 2]; 2], drains: Vec<Drain<2>>) -> Track
         drains,
         interfaces: vec![],
         planes: vec![],
+        gaps: vec![],
         draws: Draws::new(7, 2, false),
         criteria: None,
         width: Width::baseline(),
@@ -93,8 +94,8 @@ fn go(tracker: &Tracker<2, Medium>, places: &[[f64; 2]], n: u64, dt: f64) -> (Ve
 
 const OUTFLOW: [[Law; 2]; 2] = [[Law::Outflow; 2]; 2];
 
-fn plane(axis: usize, at: f64) -> Plane {
-    Plane { axis, at, period: None, watch: Watch::Times }
+fn plane(axis: usize, at: f64) -> Plane<2> {
+    Plane { axis, at, periods: [None; 2], watch: Watch::Times, part: None, draws: 0 }
 }
 
 /// `u = (x, −y)`: linear, so that cells hold it exactly. `x = x₀ eᵗ`, `y = y₀ e⁻ᵗ`.
@@ -240,7 +241,7 @@ fn around_a_period_they_come_again() {
     let flow = flow([vec![0.0, 0.5, 2.0], vec![0.0, 1.0]], |_| 0.5, |_, _| -0.25, |_, _| 0.0);
     let mut tracker = tracker(&flow, OUTFLOW, vec![]);
     tracker.ends[0] = Ends::Periodic { low: 0.0, high: 2.0 };
-    let periodic = |at: f64| Plane { period: Some(2.0), ..plane(0, at) };
+    let periodic = |at: f64| Plane { periods: [Some((0.0, 2.0)), None], ..plane(0, at) };
     tracker.planes = vec![periodic(0.0), periodic(1.0), periodic(2.0)];
     let (ends, log) = go(&tracker, &[[0.25, 0.5]], 3, 3.0);
     assert!((ends[0].unwrap()[0] - (0.25 + 4.0 + 2.0 - 4.5 - 2.0 + 2.0)).abs() < 1e-14);
