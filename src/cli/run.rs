@@ -28,6 +28,8 @@ use std::sync::Arc;
 use std::time::Instant;
 
 const FIGURE: &str = "figure.svg";
+/// Folder of solved flows, in that of results.
+pub(crate) const CACHE: &str = "cache";
 
 /// Run a scene and write its tables
 #[derive(clap::Args)]
@@ -58,6 +60,9 @@ pub(crate) struct Arguments {
     /// Leave nothing out
     #[arg(long)]
     no_passes: bool,
+    /// Solve for the flow anew, and keep it for no later run
+    #[arg(long)]
+    no_cache: bool,
 }
 
 impl Arguments {
@@ -91,7 +96,11 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
         name: scene_name(&arguments.file),
         folder: arguments.folder(),
         n_threads: arguments.n_threads(),
-        wants: Wants { figure: arguments.plot, error_bars: arguments.error },
+        wants: Wants {
+            figure: arguments.plot,
+            error_bars: arguments.error,
+            cache: (!arguments.no_cache).then(|| arguments.folder().join(CACHE)),
+        },
         settings: arguments.set.clone(),
         file: Some(arguments.file.clone()),
         begin,
@@ -119,10 +128,12 @@ pub(crate) fn run_sources(
 }
 
 /// What a run makes besides its tables.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct Wants {
     pub(crate) figure: bool,
     pub(crate) error_bars: bool,
+    /// Where solved flows are found and kept.
+    pub(crate) cache: Option<PathBuf>,
 }
 
 /// What a run is asked for besides its scene.
@@ -151,6 +162,9 @@ fn run_checked(mut checked: Checked, asked: Asked, terminal: &Terminal) -> Comma
     terminal.remark(&announcement(&compiled));
     if !compiled.left_out.is_empty() {
         terminal.diagnostics(&[compiled.left_out_note()], &checked.sources);
+    }
+    if let Some(folder) = &asked.wants.cache {
+        checked.flows.keep_in(folder.clone());
     }
     let job = Job {
         flows: checked.flows.clone(),
@@ -236,6 +250,9 @@ impl Job<'_> {
         }
         let data = keep_of_run(&self.folder, self.sources)?;
         self.write_crate(found.started, &written, data)?;
+        if self.wants.cache.as_ref() == Some(&self.folder.join(CACHE)) {
+            self.flows.forget_others();
+        }
         let measures = record::measures(&found.evaluated);
         let summary = Summary {
             folder: &self.folder,

@@ -1,7 +1,7 @@
 //! `lamella sweep`: all points of a sweep, resumed where an earlier start stopped, as one set of tables.
 
 use super::interrupt::Interrupt;
-use super::run::scene_name;
+use super::run::{CACHE, scene_name};
 use super::sweep_folder::{Folder, Shard, gather_and_tell};
 use super::text::{duration, grouped};
 use super::{CommandResult, Exit, Stopped, Terminal, facts, load, machine};
@@ -49,6 +49,28 @@ pub(crate) struct Arguments {
     /// Run one share of the points, such as 0/4; `lamella gather` makes the tables
     #[arg(long, value_name = "K/N")]
     shard: Option<Shard>,
+    /// Solve for flows anew, and keep them for no later start
+    #[arg(long)]
+    no_cache: bool,
+}
+
+impl Arguments {
+    fn folder(&self, loaded: &load::Sweep) -> PathBuf {
+        if let Some(out) = &self.out {
+            return out.clone();
+        }
+        let sweep = &loaded.scene.sweep;
+        let name = match self.over.is_empty() {
+            true => format!("{}-{}", scene_name(&self.file), sweep.name),
+            // Axes of the command line have no name of their own.
+            false => {
+                let axes = sweep.groups.iter().flatten().map(|axis| axis.target.name());
+                let axes: Vec<&str> = axes.collect();
+                format!("{}-over-{}", scene_name(&self.file), axes.join("-"))
+            }
+        };
+        Path::new("results").join(name)
+    }
 }
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
@@ -63,19 +85,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
     let loaded =
         load::load_sweep(&arguments.file, arguments.name.as_deref(), over.as_ref(), &settings, terminal)?;
     let Some(loaded) = loaded else { return Ok(Exit::SceneWrong) };
-    let out = arguments.out.clone().unwrap_or_else(|| {
-        let sweep = &loaded.scene.sweep;
-        let name = match arguments.over.is_empty() {
-            true => format!("{}-{}", scene_name(&arguments.file), sweep.name),
-            // Axes of the command line have no name of their own.
-            false => {
-                let axes = sweep.groups.iter().flatten().map(|axis| axis.target.name());
-                let axes: Vec<&str> = axes.collect();
-                format!("{}-over-{}", scene_name(&arguments.file), axes.join("-"))
-            }
-        };
-        Path::new("results").join(name)
-    });
+    let out = arguments.folder(&loaded);
     let threads = arguments.threads.map_or_else(machine::n_threads, usize::from);
     let pool = pool(threads)?;
     let points = plan_points(&loaded, &pool)?;
@@ -85,6 +95,9 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
     let shard = arguments.shard.unwrap_or_default();
     let mut folder = Folder::open(&out, shard)?;
     folder.must_hold(&loaded, &out)?;
+    if !arguments.no_cache {
+        loaded.scene.flows.keep_in(out.join(CACHE));
+    }
     let session = loaded.session(machine::now(), facts::facts(Some(&arguments.file), threads));
     super::data::keep_of_sweep(&out, &loaded.scene.sources)?;
     let session = folder.journal.add_session(session).map_err(|error| failed(&error))?;

@@ -1,7 +1,7 @@
 //! `lamella verify` and `lamella repro`: the same again, and the same bytes.
 
 use super::data::restore_of_run;
-use super::run::Wants;
+use super::run::{CACHE, Wants};
 use super::sweep::{failed, pool};
 use super::sweep_folder::{Which, open, point_of};
 use super::why::{check_replicate, is_sweep};
@@ -28,12 +28,16 @@ pub(crate) struct Arguments {
     /// Threads [default: all cores]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
+    /// Solve for the flow anew, too
+    #[arg(long)]
+    no_cache: bool,
 }
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
     let threads = arguments.threads.map_or_else(machine::n_threads, usize::from);
+    let cache = (!arguments.no_cache).then(|| arguments.folder.join(CACHE));
     if is_sweep(&arguments.folder) {
-        return verify_sweep::verify(&arguments.folder, arguments.sample, threads, terminal);
+        return verify_sweep::verify(&arguments.folder, arguments.sample, (threads, cache), terminal);
     }
     if arguments.folder.join(SWEEP_FILE).exists() {
         let text =
@@ -42,11 +46,11 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
             .help("what was run stands in the folder `journal`: put it back, or run the sweep again");
         return Err(Stopped::new(Exit::SceneWrong, message));
     }
-    verify_run(&arguments.folder, threads, terminal)
+    verify_run(&arguments.folder, threads, cache, terminal)
 }
 
 /// A run of its own: again into a temporary folder, and all data files compared.
-fn verify_run(folder: &Path, threads: usize, terminal: &Terminal) -> CommandResult {
+fn verify_run(folder: &Path, threads: usize, cache: Option<PathBuf>, terminal: &Terminal) -> CommandResult {
     let read = |name: &str| {
         std::fs::read_to_string(folder.join(name)).map_err(|_| {
             let text = format!("{} holds neither a run nor a sweep", folder.display());
@@ -71,7 +75,7 @@ fn verify_run(folder: &Path, threads: usize, terminal: &Terminal) -> CommandResu
         .tempdir_in(folder)
         .map_err(|error| failed(&format!("cannot make a folder in {}: {error}", folder.display())))?;
     // Error bars are data: they are found again where there are some. A figure is none.
-    let wants = Wants { figure: false, error_bars: folder.join(ERROR_BARS).is_dir() };
+    let wants = Wants { figure: false, error_bars: folder.join(ERROR_BARS).is_dir(), cache };
     let hushed = terminal.hushed();
     let exit = run_command::run_sources(sources, &name, &settings, again.path(), threads, wants, &hushed)?;
     if exit != Exit::Done {
@@ -164,6 +168,7 @@ pub(crate) fn repro(arguments: &ReproArguments, terminal: &Terminal) -> CommandR
         sources.add(file.name.clone(), file.text.clone());
     }
     loaded.scene.sources.data().iter().for_each(|file| sources.add_data(file.clone()));
-    let wants = Wants { figure: true, error_bars: false };
+    let cache = Some(arguments.folder.join(CACHE));
+    let wants = Wants { figure: true, error_bars: false, cache };
     run_command::run_sources(sources, &loaded.scene_name, &settings, &out, threads, wants, terminal)
 }

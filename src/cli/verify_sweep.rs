@@ -17,17 +17,20 @@ use lamella::sweep::replicate::{Task, refresh};
 use lamella::sweep::{Journal, Point, Points, Series, manifest};
 use lamella::table::{Kind, read, scan};
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Compares `sample` points, spread over all of them, and all tables.
 pub(super) fn verify(
     folder: &Path,
     sample: Option<usize>,
-    threads: usize,
+    (threads, cache): (usize, Option<PathBuf>),
     terminal: &Terminal,
 ) -> CommandResult {
     let interrupt = Interrupt::listen();
     let (journals, loaded) = open(folder)?;
+    if let Some(cache) = cache {
+        loaded.scene.flows.keep_in(cache);
+    }
     let pool = pool(threads)?;
     let points = plan_points(&loaded, &pool)?;
     let n = sample.unwrap_or(points.len()).clamp(1, points.len().max(1));

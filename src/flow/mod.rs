@@ -5,6 +5,7 @@
 
 pub mod balance;
 pub mod build;
+pub mod cache;
 pub mod cells;
 pub mod darcy;
 pub mod files;

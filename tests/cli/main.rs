@@ -1,6 +1,7 @@
 //! The program, run as a user would: each command, each exit code, each way a file can be wrong.
 
 mod basics;
+mod cache;
 mod error_bars;
 mod files;
 mod numbers;
