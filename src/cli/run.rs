@@ -309,6 +309,7 @@ impl Job<'_> {
         let watch = Watch { progress, interrupt };
         let mut snapshots = Vec::new();
         let mut refusal = None;
+        let mut of_cells = None;
         let mut sink = |snapshot: Snapshot| {
             writer.write(&snapshot).map_err(|error| {
                 let text = error.to_string();
@@ -321,6 +322,7 @@ impl Job<'_> {
             Ok(())
         };
         let outcome = self.flow_of(plan).and_then(|flow| {
+            of_cells = flow.clone().filter(|_| plan.writes_flow);
             let threads = Some(self.n_threads);
             let settings = engine::Settings { threads, flow, ..engine::Settings::default() };
             engine::run(plan, &settings, &watch, &mut sink)
@@ -329,6 +331,9 @@ impl Job<'_> {
         let outcome = outcome.map_err(|error| {
             refusal.map_or_else(|| run_failed(&error, &self.scenario, plan), table_failed)
         })?;
+        if let Some(flow) = of_cells {
+            writer.flow(flow);
+        }
         let evaluated = measure::evaluate(plan, &self.compiled.evaluation, &snapshots, &outcome)
             .map_err(measuring_failed)?;
         let find_bars = || {

@@ -102,6 +102,9 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
     super::data::keep_of_sweep(&out, &loaded.scene.sources)?;
     let session = folder.journal.add_session(session).map_err(|error| failed(&error))?;
     announce(&points, &folder, terminal);
+    if loaded.compiled.plan.writes_flow {
+        terminal.remark("the cells of flows are written by `run` and `repro`, not by a sweep");
+    }
     let watch = Progress::new(terminal, &interrupt, &out, &loaded, &points);
     let journal = Mutex::new(folder.journal);
     let settings = RunSettings {

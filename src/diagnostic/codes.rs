@@ -135,6 +135,7 @@ codes! {
     M031 "a source that cannot be",
     M032 "an output that these particles do not have",
     M033 "a flow cannot be read from its files",
+    M034 "a table of a flow that has no cells",
     T101 "a table of numbers cannot be read",
     T102 "the rows of a table make no function",
     T103 "a table is asked beyond its rows",

@@ -27,6 +27,7 @@ fn plan(axes: Vec<Axis>, outputs: Vec<Output>) -> Plan {
         transport: None,
         time: Time { step: 1.0, n_steps: 1, duration: 1.0 },
         outputs,
+        writes_flow: false,
         stages: vec![],
         seed: 1,
     }

@@ -220,7 +220,8 @@ fn output_lines(plan: &Plan) -> Vec<String> {
         let place = place_text(plan, output);
         format!("{} of {}{place}{on}, {times}", output.kind.word(), quantities.join(", "))
     };
-    plan.outputs.iter().map(line).collect()
+    let of_flow = plan.writes_flow.then(|| "flow: a row for each of its cells".to_owned());
+    plan.outputs.iter().map(line).chain(of_flow).collect()
 }
 
 /// Where an output is taken.

@@ -55,6 +55,7 @@ pub fn lower(scenario: &Scenario) -> Result<Lowered, Vec<Diagnostic>> {
         transport,
         time: Time::new(scenario.run.duration, scenario.run.step),
         outputs: scenario.outputs.iter().map(lower_output).collect(),
+        writes_flow: scenario.flow_table.is_some(),
         stages: vec![Stage::Mix, Stage::Move, Stage::Bound, Stage::Average, Stage::Observe],
         seed: scenario.seed,
         axes,

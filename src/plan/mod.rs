@@ -72,6 +72,9 @@ pub struct Plan {
     pub transport: Option<Transport>,
     pub time: Time,
     pub outputs: Vec<Output>,
+    /// Whether the cells of the flow are written.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub writes_flow: bool,
     /// What one step does, in order.
     pub stages: Vec<Stage>,
     pub seed: u64,

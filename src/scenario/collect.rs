@@ -295,6 +295,7 @@ fn build<'a>(
         chemistry: chemistry?,
         domain: domain?,
         medium,
+        flow_table: super::flow_table::flow_table(checker, statements, flow.as_ref()),
         flow,
         dispersion,
         sources: sources?,

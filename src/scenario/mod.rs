@@ -14,6 +14,7 @@ mod data_files;
 mod equilibrium;
 pub mod expression;
 mod fields;
+mod flow_table;
 mod geometry;
 mod measure;
 mod model;
@@ -92,6 +93,8 @@ pub struct Scenario {
     pub run: Run,
     pub seed: u64,
     pub outputs: Vec<Output>,
+    /// Where a table of the flow's cells is asked for.
+    pub flow_table: Option<Span>,
     pub references: Vec<Reference>,
     pub measures: Vec<Measure>,
     pub sweeps: Vec<sweep::Sweep>,

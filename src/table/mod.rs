@@ -5,6 +5,7 @@
 //! handed in.
 
 mod bins;
+mod cells;
 mod failure;
 mod footer;
 mod gather;

@@ -26,10 +26,11 @@ pub enum Kind {
     Budget,
     Errors,
     ErrorBars,
+    Flow,
 }
 
 impl Kind {
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::Profile,
         Self::Map,
         Self::Covariance,
@@ -43,6 +44,7 @@ impl Kind {
         Self::Budget,
         Self::Errors,
         Self::ErrorBars,
+        Self::Flow,
     ];
 
     /// Name of the folder.
@@ -61,6 +63,7 @@ impl Kind {
             Self::Budget => "budget",
             Self::Errors => "errors",
             Self::ErrorBars => "error_bars",
+            Self::Flow => "flow",
         }
     }
 }
@@ -189,6 +192,7 @@ pub fn columns(kind: Kind) -> Vec<Column> {
         Kind::Budget => columns.extend(row_columns(OutputKind::Budget)),
         Kind::Errors => return error_columns(),
         Kind::ErrorBars => return error_bar_columns(),
+        Kind::Flow => return super::cells::columns(),
     }
     columns.push(plain("unit", word(), "unit of the values of this row"));
     columns.push(plain("output", DataType::UInt16, "number of the output in the plan, from 0"));
@@ -308,7 +312,7 @@ fn row_value(name: &str, doc: &str) -> Column {
     Column::new(name, DataType::Float64, Measured::Row, doc).or_null()
 }
 
-fn head() -> [Column; 3] {
+pub(super) fn head() -> [Column; 3] {
     [
         plain("point", DataType::UInt32, "number of the point of the sweep, 0 for a single run"),
         plain("replicate", DataType::UInt32, "number of the replicate, from 0"),
@@ -316,7 +320,7 @@ fn head() -> [Column; 3] {
     ]
 }
 
-fn coordinates() -> [Column; 3] {
+pub(super) fn coordinates() -> [Column; 3] {
     ["x", "y", "z"].map(|name| {
         let doc = "position in the (moving) frame, of a bin its centre; null if the output has no such axis";
         Column::new(name, DataType::Float64, Measured::Fixed(Dimension::LENGTH), doc).or_null()

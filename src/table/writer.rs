@@ -10,12 +10,14 @@ use super::record::{ErrorBarRow, ErrorRow, PointRow, Record};
 use super::rows::{self, Layout, Place};
 use super::schema::{self, Column, Kind};
 use super::sheet::{Draft, Finished, Sheet, is_temporary, sync_folder};
-use super::{lists, points};
+use super::{cells, lists, points};
 use crate::engine::snapshot::Snapshot;
+use crate::flow::FaceFlow;
 use crate::plan::Plan;
 use arrow_array::{ArrayRef, RecordBatch};
 use std::fs::{self, File};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Writes one run. Until [`Writer::finish`] returns, readers see what was there before; a writer
@@ -28,6 +30,7 @@ pub struct Writer {
     pub(super) record: Record,
     pub(super) sheets: Vec<(Kind, Layout, Sheet)>,
     error_bars: Vec<ErrorBarRow>,
+    flow: Option<Arc<FaceFlow>>,
     elapsed: Duration,
 }
 
@@ -64,6 +67,7 @@ impl Writer {
             record: record.clone(),
             sheets: Vec::new(),
             error_bars: Vec::new(),
+            flow: None,
             elapsed: Duration::ZERO,
         };
         for kind in Kind::ALL {
@@ -100,6 +104,22 @@ impl Writer {
         self.error_bars = rows;
     }
 
+    /// Takes the flow whose cells are written at the end.
+    pub fn flow(&mut self, flow: Arc<FaceFlow>) {
+        self.flow = Some(flow);
+    }
+
+    /// The table of the flow, finished but not yet named.
+    fn flow_table(&mut self) -> Result<Option<(Kind, Finished)>, TableError> {
+        let Some(flow) = self.flow.take() else { return Ok(None) };
+        let columns = schema::columns(Kind::Flow);
+        let schema = schema::arrow_schema(&columns, None);
+        let footer = Footer::new(Kind::Flow.name(), &self.plan, &self.record, &columns, None);
+        let mut sheet = Sheet::create(&self.part(Kind::Flow), schema.clone(), &footer)?;
+        cells::append(&mut sheet, &schema, &self.plan, &flow, 0.0)?;
+        Ok(Some((Kind::Flow, sheet.finish()?)))
+    }
+
     /// Completes every file, then gives all of them their names.
     pub fn finish(mut self, mut points: Vec<PointRow>, errors: &[ErrorRow]) -> Result<Summary, TableError> {
         let begin = Instant::now();
@@ -108,6 +128,10 @@ impl Writer {
         for (kind, _, sheet) in std::mem::take(&mut self.sheets) {
             tables.push((kind.name().to_owned(), schema::columns(kind)));
             done.push((part_name(kind), sheet.finish()?));
+        }
+        if let Some((kind, finished)) = self.flow_table()? {
+            tables.push((kind.name().to_owned(), schema::columns(kind)));
+            done.push((part_name(kind), finished));
         }
         let bars = std::mem::take(&mut self.error_bars);
         let lists = [

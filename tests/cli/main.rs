@@ -4,6 +4,7 @@ mod basics;
 mod cache;
 mod error_bars;
 mod files;
+mod flow_table;
 mod numbers;
 mod overhead;
 mod program;

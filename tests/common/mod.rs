@@ -49,6 +49,7 @@ pub fn plan() -> Plan {
             output(OutputKind::Mixing, vec![Pair(0, 1)], vec![N_BINS, 1], &[10.0, 20.0]),
             output(OutputKind::Particles, vec![One(0), One(1)], Vec::new(), &[20.0]),
         ],
+        writes_flow: false,
         stages: vec![Stage::Move, Stage::Bound, Stage::Average, Stage::Observe],
         seed: u64::MAX,
     }

@@ -54,6 +54,8 @@ TABLES |= {
     "dilution": HEAD + [("species", WORD, ""), ("index", REAL, ROW), ("entropy", REAL, "1"), ("reactor_ratio", REAL, "1")] + TAIL,
     "budget": HEAD + [("place", WORD, ""), ("species", WORD, ""), ("amount", REAL, ROW), ("entered", REAL, ROW),
                       ("left", REAL, ROW)] + TAIL,
+    "flow": HEAD + PLACE + [("head", REAL, "m"), ("conductivity", REAL, "m/s"), ("porosity", REAL, "1")]
+    + [("discharge_" + axis, REAL, "m/s") for axis in "xyz"],
 }
 
 # Columns of points.parquet that every run has; scenes add more.
@@ -224,7 +226,8 @@ def check_together(runs):
         if len(files) < 2:
             continue
         n_tables += 1
-        word = "species" if any(name == "species" for name, _, _ in columns) else "species_a"
+        names = {name for name, _, _ in columns}
+        word = next(name for name in ("species", "species_a", "point") if name in names)
         arrow = pyarrow.dataset.dataset(files, format="parquet").to_table()
         truth = counted(arrow.column(word).to_pylist())
         frame = polars.scan_parquet(files).group_by(word).len().collect()
