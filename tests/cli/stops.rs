@@ -145,3 +145,25 @@ fn a_flow_without_a_solution_shows_its_block() {
         folder.lamella(&["run", "s.lam", "--out", "right"]).exits(0);
     }
 }
+
+/// Parcels of water need to know what the water through a side carries: the side is shown, and what would do runs.
+#[test]
+fn water_through_a_side_that_does_not_say_so_shows_the_side() {
+    let scene = |right: &str| {
+        format!(
+            "lamella 1\nspecies A\ndomain line x = 0 .. 10 m\nboundary left inflow A = 1 mol/m^3\nboundary right {right}\n\
+             flow uniform 1 m/d\ndispersion 0.1 m^2/d\nparticles fluid 1000\nrun to 1 d, step 0.5 d\n\
+             output total A at t = 1 d\n"
+        )
+    };
+    let folder = Folder::new();
+    folder.write("s.lam", scene("reflect"));
+    let message = stop(&folder);
+    assert_eq!(message["code"], "R108", "{message}");
+    let text = message["message"].as_str().unwrap_or_default();
+    assert!(text.contains("`right`") && text.contains("reflects"), "{message}");
+    assert_eq!(place(&message), (5, "nothing says what this water carries"));
+    assert!(help(&message).contains("`inflow`"), "{message}");
+    folder.write("s.lam", scene("outflow"));
+    folder.lamella(&["run", "s.lam", "--out", "right"]).exits(0);
+}
