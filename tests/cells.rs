@@ -5,7 +5,7 @@ mod support;
 use lamella::engine::Settings;
 use lamella::engine::snapshot::Values;
 use lamella::flow::darcy::{self, Problem};
-use lamella::flow::{Cells, FaceFlow};
+use lamella::flow::{Cells, FaceFlow, FlowSeries};
 use lamella::plan::burnett_frind::uniform_tensor;
 use lamella::plan::tape::{Binary, Operation, Tape};
 use lamella::plan::transport::{
@@ -92,6 +92,7 @@ fn scene(flow: &FaceFlow, d: usize, dispersion: [f64; 4], n: u64, duration: f64)
             anisotropy: vec![1.0; d],
             wells: vec![],
         })),
+        changes: vec![],
         dispersion: Dispersion::Velocity { longitudinal, transverse, transverse_vertical, molecular },
         porosity,
         sides,
@@ -119,7 +120,7 @@ fn scene(flow: &FaceFlow, d: usize, dispersion: [f64; 4], n: u64, duration: f64)
 fn chi_of_uniform(plan: &mut Plan, flow: FaceFlow, bins: Vec<usize>) -> f64 {
     let n_bins = bins.iter().product::<usize>() as f64;
     plan.outputs = vec![output(OutputKind::Map, vec![Quantity::Species(0)], bins, vec![plan.time.duration])];
-    let settings = Settings { flow: Some(Arc::new(flow)), ..Settings::default() };
+    let settings = Settings { flow: Some(FlowSeries::steady(Arc::new(flow))), ..Settings::default() };
     let (outcome, snapshots) = run_with(plan, &settings).unwrap();
     assert!(outcome.worst_defect() < 1e-12);
     let Values::Binned { mean, standard_error, .. } = &snapshots[0].values else { panic!() };
@@ -209,7 +210,8 @@ fn a_pulse_spreads_in_three_ways_across_an_oblique_flow() {
         });
         transport.sides.iter_mut().flatten().flatten().for_each(|patch| patch.rule = SideRule::Reflect);
         plan.outputs = vec![output(OutputKind::Particles, vec![Quantity::Species(0)], vec![], vec![4.0])];
-        let settings = Settings { flow: Some(Arc::new(flow.clone())), ..Settings::default() };
+        let settings =
+            Settings { flow: Some(FlowSeries::steady(Arc::new(flow.clone()))), ..Settings::default() };
         let (_, snapshots) = run_with(&plan, &settings).unwrap();
         let Values::Particles { positions, .. } = &snapshots[0].values else { panic!() };
         let n = positions[0].len() as f64;

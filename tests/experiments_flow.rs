@@ -30,13 +30,14 @@ fn flow(checked: &Checked) -> (Plan, Arc<FaceFlow>) {
     let compiled = checked.compiled.clone();
     let plan = compiled.unwrap_or_else(|| panic!("no plan: {:#?}", checked.diagnostics)).plan;
     let flow = checked.flows.of(&plan, &checked.sources).unwrap().unwrap();
-    (plan, flow)
+    (plan, flow.flow(0).clone())
 }
 
 /// What has left through a place by each time, kg/m.
 fn left(plan: &Plan, flow: Arc<FaceFlow>, place: &str) -> Vec<f64> {
     let mut snapshots: Vec<Snapshot> = Vec::new();
-    let settings = EngineSettings { flow: Some(flow), ..EngineSettings::default() };
+    let settings =
+        EngineSettings { flow: Some(lamella::flow::FlowSeries::steady(flow)), ..EngineSettings::default() };
     let outcome = lamella::engine::run(plan, &settings, &Unattended, &mut |snapshot| {
         snapshots.push(snapshot);
         Ok(())

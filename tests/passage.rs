@@ -40,6 +40,7 @@ fn scene(
         (0..n_axes).flat_map(|row| (0..=row).map(move |column| if row == column { d } else { 0.0 }));
     let transport = Transport {
         flow: Flow::Uniform(velocity),
+        changes: vec![],
         dispersion: Dispersion::Constant(triangle.collect()),
         porosity: constant(1.0),
         sides: rules.iter().map(|[a, b]| [patch(a), patch(b)]).collect(),

@@ -32,6 +32,7 @@ fn scene(low: &[f64], high: &[f64], rules: &[[SideRule; 2]], n: u64, duration: f
     let patch = |rule: &SideRule| vec![Patch { low: low.to_vec(), high: high.to_vec(), rule: rule.clone() }];
     let transport = Transport {
         flow: Flow::Uniform(vec![0.0; d]),
+        changes: vec![],
         dispersion: Dispersion::Constant(vec![0.0; d * (d + 1) / 2]),
         porosity: constant(1.0),
         sides: rules.iter().map(|[a, b]| [patch(a), patch(b)]).collect(),

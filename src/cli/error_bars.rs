@@ -8,12 +8,11 @@ use lamella::diagnostic::{Diagnostic, codes};
 use lamella::engine::snapshot::Snapshot;
 use lamella::engine::{self, RunError};
 use lamella::estimate::{self, Advice, Trials};
-use lamella::flow::FaceFlow;
+use lamella::flow::FlowSeries;
 use lamella::plan::Plan;
 use lamella::scenario::Scenario;
 use lamella::table::ErrorBarRow;
 use serde::Serialize;
-use std::sync::Arc;
 use std::time::Instant;
 
 /// More lines than this are in the results, not on the terminal.
@@ -29,7 +28,7 @@ pub(crate) struct ErrorBars {
 }
 
 /// The flow of a plan: that of the run, as long as nothing of it is another.
-pub(crate) type FlowOf<'a> = dyn Fn(&Plan) -> Result<Option<Arc<FaceFlow>>, RunError> + 'a;
+pub(crate) type FlowOf<'a> = dyn Fn(&Plan) -> Result<Option<FlowSeries>, RunError> + 'a;
 
 impl ErrorBars {
     /// Runs the trials one after the other.

@@ -14,7 +14,7 @@ use lamella::Checked;
 use lamella::diagnostic::{Diagnostic, codes};
 use lamella::engine::snapshot::{Outcome, Snapshot, Values};
 use lamella::engine::{self, Control, RunError};
-use lamella::flow::{FaceFlow, Flows};
+use lamella::flow::{FlowSeries, Flows};
 use lamella::measure::{self, Evaluated};
 use lamella::plan::Plan;
 use lamella::plan::compile::{Compiled, Options};
@@ -332,7 +332,7 @@ impl Job<'_> {
             refusal.map_or_else(|| run_failed(&error, &self.scenario, plan), table_failed)
         })?;
         if let Some(flow) = of_cells {
-            writer.flow(flow);
+            writer.flow(flow.flow(0).clone());
         }
         let evaluated = measure::evaluate(plan, &self.compiled.evaluation, &snapshots, &outcome)
             .map_err(measuring_failed)?;
@@ -345,7 +345,7 @@ impl Job<'_> {
         Ok(Found { outcome, snapshots, evaluated, error_bars, started })
     }
 
-    fn flow_of(&self, plan: &Plan) -> Result<Option<Arc<FaceFlow>>, RunError> {
+    fn flow_of(&self, plan: &Plan) -> Result<Option<FlowSeries>, RunError> {
         self.flows.of(plan, self.sources).map_err(|error| RunError::Flow(error.to_string()))
     }
 

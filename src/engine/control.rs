@@ -3,8 +3,7 @@
 //! Owns the settings and the line to the caller. May use `flow`. It deliberately
 //! prints nothing.
 
-use crate::flow::FaceFlow;
-use std::sync::Arc;
+use crate::flow::FlowSeries;
 
 /// How a plan is run: threads and vector instructions change no byte of the results, half draws do.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -17,8 +16,8 @@ pub struct Settings {
     /// plan with half the step and without this: both runs then follow the same paths, and differ by
     /// what the step does to them alone.
     pub takes_half_draws: bool,
-    /// The flow of the plan, where one has to be solved or read.
-    pub flow: Option<Arc<FaceFlow>>,
+    /// The flows of the plan, one after another, where they have to be solved or read.
+    pub flow: Option<FlowSeries>,
 }
 
 /// Progress and Ctrl-C, asked once per step.

@@ -6,6 +6,7 @@
 mod ahead;
 mod amount;
 mod average;
+mod calendar;
 mod clock;
 mod conserved;
 mod control;

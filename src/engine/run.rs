@@ -5,6 +5,7 @@
 
 use super::amount::{self, Amount};
 use super::average::{self, Means};
+use super::calendar::Calendar;
 use super::clock::Clock;
 use super::conserved;
 use super::control::{Control, Settings};
@@ -80,7 +81,8 @@ pub fn run<const D: usize>(
     sink: Sink,
 ) -> Result<Outcome, RunError> {
     let mut clock = Clock::start();
-    let mut dues = schedule(plan)?;
+    let calendar = Calendar::new(&plan.time, &[]);
+    let mut dues = schedule(plan, &calendar)?;
     let mut run = Run::<D>::new(plan, settings, &mut dues)?;
     let mut loop_clock = Clock::start();
     let mut dues = dues.iter().peekable();

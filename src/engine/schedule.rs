@@ -2,13 +2,14 @@
 //!
 //! Owns the calendar of a run. May use the plan. It deliberately knows nothing of what is observed.
 
+use super::calendar::Calendar;
 use super::error::RunError;
 use super::program::unsound;
 use crate::plan::{Plan, Time};
 
 /// A time is on the grid of steps if it is this near, in steps. The beginning is 0 and nothing else: there
 /// may be much to see in the first part of a long step.
-const ON_GRID: f64 = 1e-9;
+pub const ON_GRID: f64 = 1e-9;
 
 /// A time at which outputs are due.
 #[derive(Debug, Clone, PartialEq)]
@@ -28,12 +29,12 @@ pub fn step_length(time: &Time, step: u64) -> f64 {
     if step + 1 == time.n_steps { time.duration - time.step * step as f64 } else { time.step }
 }
 
-/// All due times in order.
-pub fn schedule(plan: &Plan) -> Result<Vec<Due>, RunError> {
+/// All due times in order, by the steps of a calendar.
+pub fn schedule(plan: &Plan, calendar: &Calendar) -> Result<Vec<Due>, RunError> {
     let mut dues: Vec<Due> = Vec::new();
     for (output_idx, output) in plan.outputs.iter().enumerate() {
         for &t in &output.times {
-            let (steps, fraction) = locate(&plan.time, t).ok_or_else(|| {
+            let (steps, fraction) = calendar.locate(t).ok_or_else(|| {
                 unsound(&format!("an output at {t} s, outside 0 … {} s", plan.time.duration))
             })?;
             dues.push(Due { steps, fraction, t, outputs: vec![output_idx] });
@@ -58,7 +59,7 @@ pub fn schedule(plan: &Plan) -> Result<Vec<Due>, RunError> {
 }
 
 /// Steps and fraction of a time; `None` outside the run.
-fn locate(time: &Time, t: f64) -> Option<(u64, f64)> {
+pub fn locate(time: &Time, t: f64) -> Option<(u64, f64)> {
     if !(t >= 0.0 && t <= time.duration * (1.0 + 1e-12)) {
         return None;
     }

@@ -5,11 +5,13 @@
 
 use super::darcy::{self, Problem, Side, Solution};
 use super::random_field::{self, RandomField, lognormal};
-use super::{Cells, darcy::DarcyError, random_field::FieldError};
+use super::series::{Period, SeriesError};
+use super::{Cells, FlowSeries, darcy::DarcyError, random_field::FieldError};
 use crate::plan::Plan;
 use crate::plan::tape::Tape;
-use crate::plan::transport::{Conductivity, Covariance, Darcy, DarcySide, Flow};
+use crate::plan::transport::{Changed, Conductivity, Covariance, Darcy, DarcySide, Flow, Transport, Well};
 use std::fmt;
+use std::sync::Arc;
 
 /// Why a plan has no flow.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,6 +21,7 @@ pub enum FlowError {
     Darcy(DarcyError),
     /// What is wrong with a file.
     File(String),
+    Series(SeriesError),
 }
 
 impl fmt::Display for FlowError {
@@ -28,52 +31,109 @@ impl fmt::Display for FlowError {
             Self::Field(error) => write!(f, "{error}"),
             Self::Darcy(error) => write!(f, "{error}"),
             Self::File(error) => write!(f, "{error}"),
+            Self::Series(error) => write!(f, "{error}"),
         }
     }
 }
 
 impl std::error::Error for FlowError {}
 
-/// Solves for the flow of a plan; nothing if the plan needs no cells, or if they come from a file.
+/// Solves for the flow that a plan begins with; nothing if the plan needs no cells, or if they come from a file.
 pub fn of(plan: &Plan) -> Result<Option<Solution>, FlowError> {
-    match plan.transport.as_ref().map(|transport| &transport.flow) {
-        Some(Flow::Darcy(flow)) => solve(plan, flow).map(Some),
-        Some(Flow::Uniform(_) | Flow::Expression(_) | Flow::File(_)) | None => Ok(None),
+    let Some((_, flow)) = darcy_of(plan) else { return Ok(None) };
+    let ground = Ground::new(plan, flow)?;
+    ground.solve(plan, flow, &flow.sides, &rates(flow)).map(Some)
+}
+
+/// Solves for all flows of a plan, one after another; nothing if it needs no cells, or if they come from a file.
+pub fn series(plan: &Plan) -> Result<Option<FlowSeries>, FlowError> {
+    let Some((transport, flow)) = darcy_of(plan) else { return Ok(None) };
+    let ground = Ground::new(plan, flow)?;
+    let first = ground.solve(plan, flow, &flow.sides, &rates(flow))?;
+    let mut periods = vec![Period { from: 0.0, flow: Arc::new(first.flow) }];
+    for change in &transport.changes {
+        let Changed::Darcy { sides, rates } = &change.flow else { continue };
+        let solution = ground.solve(plan, flow, sides, rates)?;
+        periods.push(Period { from: change.from, flow: Arc::new(solution.flow) });
+    }
+    FlowSeries::new(periods).map(Some).map_err(FlowError::Series)
+}
+
+fn darcy_of(plan: &Plan) -> Option<(&Transport, &Darcy)> {
+    let transport = plan.transport.as_ref()?;
+    match &transport.flow {
+        Flow::Darcy(flow) => Some((transport, flow)),
+        Flow::Uniform(_) | Flow::Expression(_) | Flow::File(_) => None,
     }
 }
 
-fn solve(plan: &Plan, flow: &Darcy) -> Result<Solution, FlowError> {
-    let cells = cells(plan, flow).ok_or(FlowError::Cells)?;
-    let mut sides = [[Side::NoFlow; 2]; 3];
-    let mut anisotropy = [1.0; 3];
-    for (idx, axis) in plan.axes.iter().enumerate() {
-        if let (Some(written), Some(factor)) = (flow.sides.get(idx), flow.anisotropy.get(idx)) {
-            sides[axis.index] = written.map(side);
-            anisotropy[axis.index] = *factor;
-        }
-    }
-    let conductivity = conductivity(plan, flow, &cells)?;
-    let porosity = match &plan.transport {
-        Some(transport) => at_centres(&transport.porosity, &cells),
-        None => vec![1.0; cells.n_cells()],
-    };
-    let mut wells = Vec::new();
-    let mut owners = Vec::new();
-    for (owner, well) in flow.wells.iter().enumerate() {
-        let place = |ends: &[f64]| {
-            let mut place = [0.5; 3];
-            plan.axes.iter().zip(ends).for_each(|(axis, &end)| place[axis.index] = end);
-            place
+fn rates(flow: &Darcy) -> Vec<f64> {
+    flow.wells.iter().map(|well| well.rate).collect()
+}
+
+/// What stays the same while heads and wells change.
+#[derive(Clone)]
+struct Ground {
+    cells: Cells,
+    conductivity: Vec<f64>,
+    porosity: Vec<f64>,
+}
+
+impl Ground {
+    fn new(plan: &Plan, flow: &Darcy) -> Result<Self, FlowError> {
+        let cells = cells(plan, flow).ok_or(FlowError::Cells)?;
+        let conductivity = conductivity(plan, flow, &cells)?;
+        let porosity = match &plan.transport {
+            Some(transport) => at_centres(&transport.porosity, &cells),
+            None => vec![1.0; cells.n_cells()],
         };
-        let found = darcy::wells(&cells, &conductivity, place(&well.low), place(&well.high), well.rate);
-        wells.extend(found.map_err(FlowError::Darcy)?);
-        owners.resize(wells.len(), owner);
+        Ok(Self { cells, conductivity, porosity })
     }
-    let problem = Problem { cells, conductivity, anisotropy, porosity, sides, wells };
-    let mut solution = darcy::solve(problem).map_err(FlowError::Darcy)?;
-    // The parts of a screen belong to one well.
-    solution.flow.sinks.iter_mut().zip(owners).for_each(|(sink, owner)| sink.owner = owner);
-    Ok(solution)
+
+    fn solve(
+        &self,
+        plan: &Plan,
+        flow: &Darcy,
+        written: &[[DarcySide; 2]],
+        rates: &[f64],
+    ) -> Result<Solution, FlowError> {
+        let Self { cells, conductivity, porosity } = self.clone();
+        let mut sides = [[Side::NoFlow; 2]; 3];
+        let mut anisotropy = [1.0; 3];
+        for (idx, axis) in plan.axes.iter().enumerate() {
+            if let (Some(written), Some(factor)) = (written.get(idx), flow.anisotropy.get(idx)) {
+                sides[axis.index] = written.map(side);
+                anisotropy[axis.index] = *factor;
+            }
+        }
+        let mut wells = Vec::new();
+        let mut owners = Vec::new();
+        for (owner, (well, &rate)) in flow.wells.iter().zip(rates).enumerate() {
+            wells.extend(well_cells(plan, well, rate, &cells, &conductivity).map_err(FlowError::Darcy)?);
+            owners.resize(wells.len(), owner);
+        }
+        let problem = Problem { cells, conductivity, anisotropy, porosity, sides, wells };
+        let mut solution = darcy::solve(problem).map_err(FlowError::Darcy)?;
+        // The parts of a screen belong to one well.
+        solution.flow.sinks.iter_mut().zip(owners).for_each(|(sink, owner)| sink.owner = owner);
+        Ok(solution)
+    }
+}
+
+/// The cells of a well, each with its part of the rate.
+pub fn well_cells(
+    plan: &Plan,
+    well: &Well,
+    rate: f64,
+    cells: &Cells,
+    conductivity: &[f64],
+) -> Result<Vec<darcy::Well>, DarcyError> {
+    let place = |ends: &[f64]| {
+        let mut place = [0.5; 3];
+        plan.axes.iter().zip(ends).for_each(|(axis, &end)| place[axis.index] = end);
+        place
+    };
+    darcy::wells(cells, conductivity, place(&well.low), place(&well.high), rate)
 }
 
 /// Cells over the domain; an axis that it does not have is one cell from 0 to 1.

@@ -8,7 +8,7 @@ use super::files::{self, Loaded, Setting, Trouble};
 use super::memo::{Key, Memo};
 use super::read::window::Extent;
 use super::read::{Kind, ReadError};
-use super::{FaceFlow, Sink, cache};
+use super::{FaceFlow, FlowSeries, Sink, cache};
 use crate::plan::tape::Tape;
 use crate::plan::transport::{Flow, FlowFile};
 use crate::plan::{NUMERICS_VERSION, Plan};
@@ -79,17 +79,20 @@ impl Flows {
         })
     }
 
-    /// The flow of a plan; nothing if it needs no cells.
-    pub fn of(&self, plan: &Plan, sources: &Sources) -> Result<Option<Arc<FaceFlow>>, FlowError> {
+    /// The flows of a plan, one after another; nothing if it needs no cells.
+    pub fn of(&self, plan: &Plan, sources: &Sources) -> Result<Option<FlowSeries>, FlowError> {
         let Some(transport) = &plan.transport else { return Ok(None) };
         match &transport.flow {
             Flow::Uniform(_) | Flow::Expression(_) => Ok(None),
             Flow::File(flow) => {
                 let loaded = self.read(&flow.file, &extents(plan), &transport.porosity, sources);
                 let loaded = loaded.map_err(|trouble| FlowError::File(trouble.error.to_string()))?;
-                Ok(Some(loaded.flow.clone()))
+                Ok(Some(FlowSeries::steady(loaded.flow.clone())))
             }
             Flow::Darcy(darcy) => {
+                if !transport.changes.is_empty() {
+                    return build::series(plan);
+                }
                 let key = key(&("solved", NUMERICS_VERSION, extents(plan), darcy, &transport.porosity));
                 let n_cells = darcy.cells.iter().fold(1_usize, |n, &cells| n.saturating_mul(cells));
                 let folder = self.folder.get().filter(|_| n_cells >= cache::FEWEST_CELLS);
@@ -97,7 +100,8 @@ impl Flows {
                     Some(folder) => self.kept(folder, key, plan),
                     None => self.solve(plan),
                 };
-                self.solved.get(key, size_of_solved, answer).map(Some)
+                let flow = self.solved.get(key, size_of_solved, answer)?;
+                Ok(Some(FlowSeries::steady(flow)))
             }
         }
     }
@@ -174,7 +178,7 @@ mod tests {
     #[test]
     fn what_does_not_touch_a_flow_does_not_solve_again() {
         let flows = Flows::default();
-        let of = |from, to| flows.of(&plan(from, to), &Sources::default()).unwrap().unwrap();
+        let of = |from, to| flows.of(&plan(from, to), &Sources::default()).unwrap().unwrap().flow(0).clone();
         let first = of("mass 100", "mass 100");
         for (from, to) in [
             ("mass 100", "mass 200"),
@@ -196,7 +200,7 @@ mod tests {
             let flows = Flows::default();
             flows.keep_in(folder.path().to_owned());
             let flow = flows.of(&plan("mass 100", "mass 100"), &Sources::default()).unwrap().unwrap();
-            (flow, flows.n_solved(), flows)
+            (flow.flow(0).clone(), flows.n_solved(), flows)
         };
         let (solved, n_first, _) = start();
         let (found, n_second, flows) = start();

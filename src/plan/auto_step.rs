@@ -64,7 +64,8 @@ fn longest(axes: &[Axis], outputs: &[Output], transport: &Transport, auto: Auto)
         Flow::Uniform(_) | Flow::Expression(_) => (bin_sizes(axes, outputs), 1.0),
     };
     let speed = speed(axes, transport);
-    let velocity = match &transport.flow {
+    let flows = transport.flows();
+    let of_flow = |flow: &Flow| match flow {
         Flow::Uniform(velocity) => velocity.iter().map(|v| v.abs()).collect(),
         Flow::Expression(tapes) => {
             let largest = |tape: &super::tape::Tape| {
@@ -78,6 +79,10 @@ fn longest(axes: &[Axis], outputs: &[Output], transport: &Transport, auto: Auto)
         }
         Flow::Darcy(_) | Flow::File(_) => vec![speed / (axes.len() as f64).sqrt(); axes.len()],
     };
+    let mut velocity: Vec<f64> = vec![0.0; axes.len()];
+    for own in flows.iter().map(of_flow) {
+        velocity.iter_mut().zip(own).for_each(|(largest, v): (&mut f64, f64)| *largest = largest.max(v));
+    }
     let spread = spread(axes, &transport.dispersion, speed);
     (limit(&sizes, &velocity, &vec![spread; axes.len()], auto), n_cells)
 }

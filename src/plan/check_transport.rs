@@ -4,8 +4,8 @@ use super::Plan;
 use super::check::{check_tape, require};
 use super::tape::Tape;
 use super::transport::{
-    Conductivity, Darcy, Decay, Dispersion, Flow, FlowFacts, Patch, Region, SideRule, Source, Strength,
-    Transport, Turn,
+    Changed, Conductivity, Darcy, Decay, Dispersion, Flow, FlowFacts, Patch, Region, SideRule, Source,
+    Strength, Transport, Turn,
 };
 
 impl Plan {
@@ -13,6 +13,7 @@ impl Plan {
         let Some(transport) = &self.transport else { return Ok(()) };
         let n_axes = self.axes.len();
         check_flow(&transport.flow, n_axes)?;
+        check_changes(transport, n_axes)?;
         check_dispersion(&transport.dispersion, n_axes)?;
         tape(&transport.porosity, "the porosity")?;
         require(transport.sides.len() == n_axes, || "an axis has no sides of transport".into())?;
@@ -64,7 +65,13 @@ impl Plan {
             Region::Table(cloud) => cloud.n_axes() == n_axes,
         };
         require(is_right && source.species < self.species.len(), wrong)?;
-        let (Strength::Pulse(value) | Strength::Rate(value) | Strength::Held(value)) = source.strength;
+        let value = match &source.strength {
+            Strength::Pulse(value) | Strength::Rate(value) | Strength::Held(value) => *value,
+            Strength::RateInTime(it) | Strength::HeldInTime(it) => {
+                tape(it, "a source")?;
+                0.0
+            }
+        };
         let (from, to) = source.during;
         let is_right = value.is_finite() && value >= 0.0 && from.is_finite() && from <= to;
         require(is_right, wrong)
@@ -128,12 +135,31 @@ fn check_flow(flow: &Flow, n_axes: usize) -> Result<(), String> {
     }
 }
 
+/// New flows are of the kind of the first, in rising order of time.
+fn check_changes(transport: &Transport, n_axes: usize) -> Result<(), String> {
+    let starts = transport.starts();
+    let is_rising = starts.windows(2).all(|pair| pair[0] < pair[1]) && starts.iter().all(|t| t.is_finite());
+    require(is_rising, || "new flows do not follow one another".into())?;
+    for change in &transport.changes {
+        let is_right = match (&change.flow, &transport.flow) {
+            (Changed::Uniform(_) | Changed::Expression(_), Flow::Uniform(_) | Flow::Expression(_)) => true,
+            (Changed::Darcy { sides, rates }, Flow::Darcy(darcy)) => {
+                sides.len() == darcy.sides.len() && rates.len() == darcy.wells.len()
+            }
+            _ => false,
+        };
+        require(is_right, || "a new flow is of another kind than the first".into())?;
+    }
+    transport.flows().iter().skip(1).try_for_each(|flow| check_flow(flow, n_axes))
+}
+
 fn check_darcy(darcy: &Darcy, n_axes: usize) -> Result<(), String> {
     let lengths = [darcy.cells.len(), darcy.sides.len(), darcy.anisotropy.len()];
     require(lengths == [n_axes; 3], || "a Darcy flow does not fit the axes".into())?;
     require(darcy.cells.iter().all(|n| *n >= 1), || "a Darcy flow has no cells".into())?;
     let wells = darcy.wells.iter().all(|well| well.low.len() == n_axes && well.high.len() == n_axes);
     require(wells, || "a well does not fit the axes".into())?;
+    darcy.wells.iter().flat_map(|well| &well.carrying).try_for_each(|it| tape(it, "a well"))?;
     match &darcy.conductivity {
         Conductivity::Expression(it) => tape(it, "the conductivity"),
         Conductivity::Lognormal { lengths, .. } => {

@@ -4,10 +4,11 @@
 
 use super::Plan;
 use super::explain::grouped;
+use super::in_time::is_timed;
 use super::tape::{Operation, Tape};
 use super::transport::{
-    Conductivity, Covariance, Darcy, DarcySide, Dispersion, FileFlow, Flow, Patch, Region, SideRule, Source,
-    Strength, Transport,
+    Change, Changed, Conductivity, Covariance, Darcy, DarcySide, Dispersion, FileFlow, Flow, Patch, Region,
+    SideRule, Source, Strength, Transport,
 };
 use crate::diagnostic::number;
 
@@ -15,6 +16,7 @@ use crate::diagnostic::number;
 pub(super) fn lines(plan: &Plan) -> Vec<String> {
     let Some(transport) = &plan.transport else { return Vec::new() };
     let mut lines = flow_lines(plan, &transport.flow);
+    lines.extend(transport.changes.iter().flat_map(|change| change_lines(plan, transport, change)));
     lines.push(dispersion_line(&transport.dispersion));
     lines.extend(path_line(plan, transport));
     lines.push(format!("porosity: {}", tape(&transport.porosity, "")));
@@ -80,6 +82,9 @@ fn carrier(plan: &Plan, idx: usize) -> &str {
 fn tape(tape: &Tape, unit: &str) -> String {
     match tape.operations.as_slice() {
         [Operation::Constant(value)] => format!("{}{unit}", number(*value)),
+        operations if is_timed(tape) => {
+            format!("an expression of {} operations that changes in time", operations.len())
+        }
         operations => format!("an expression of {} operations", operations.len()),
     }
 }
@@ -121,17 +126,42 @@ fn file_lines(flow: &FileFlow) -> Vec<String> {
     lines
 }
 
+/// What of the flow is new from a time on.
+fn change_lines(plan: &Plan, transport: &Transport, change: &Change) -> Vec<String> {
+    let from = format!("  from {} s", number(change.from));
+    match (&change.flow, &transport.flow) {
+        (Changed::Uniform(velocity), _) => vec![format!("{from}: uniform, ({}) m/s", list(velocity))],
+        (Changed::Expression(tapes), _) => {
+            let parts: Vec<String> = tapes.iter().map(|part| tape(part, " m/s")).collect();
+            vec![format!("{from}: velocity ({})", parts.join(", "))]
+        }
+        (Changed::Darcy { sides, rates }, Flow::Darcy(first)) => {
+            let mut parts: Vec<String> =
+                plan.axes.iter().zip(sides).map(|(axis, ends)| ends_text(axis.index, ends)).collect();
+            let wells = first.wells.iter().zip(rates);
+            parts
+                .extend(wells.map(|(well, rate)| format!("well {}, rate {} (SI)", well.name, number(*rate))));
+            vec![format!("{from}: {}", parts.join("; "))]
+        }
+        _ => Vec::new(),
+    }
+}
+
+fn ends_text(axis: usize, ends: &[DarcySide; 2]) -> String {
+    let side = |side: &DarcySide| match side {
+        DarcySide::Head(head) => format!("head {} m", number(*head)),
+        DarcySide::Flux(flux) => format!("flux {} m/s inwards", number(*flux)),
+        DarcySide::NoFlow => "no flow".to_owned(),
+        DarcySide::Periodic => "periodic".to_owned(),
+    };
+    format!("along {}: {} / {}", axis_name(axis), side(&ends[0]), side(&ends[1]))
+}
+
 fn darcy_lines(plan: &Plan, darcy: &Darcy) -> Vec<String> {
     let cells: Vec<String> = darcy.cells.iter().map(ToString::to_string).collect();
     let mut lines = vec![format!("flow: Darcy on {} cells", cells.join(" x "))];
     for (axis, ends) in plan.axes.iter().zip(&darcy.sides) {
-        let side = |side: &DarcySide| match side {
-            DarcySide::Head(head) => format!("head {} m", number(*head)),
-            DarcySide::Flux(flux) => format!("flux {} m/s inwards", number(*flux)),
-            DarcySide::NoFlow => "no flow".to_owned(),
-            DarcySide::Periodic => "periodic".to_owned(),
-        };
-        lines.push(format!("  along {}: {} / {}", axis_name(axis.index), side(&ends[0]), side(&ends[1])));
+        lines.push(format!("  {}", ends_text(axis.index, ends)));
     }
     lines.push(match &darcy.conductivity {
         Conductivity::Expression(of) => format!("  conductivity {}", tape(of, " m/s")),
@@ -155,7 +185,12 @@ fn darcy_lines(plan: &Plan, darcy: &Darcy) -> Vec<String> {
         } else {
             format!("from ({}) to ({}) m", list(&well.low), list(&well.high))
         };
-        lines.push(format!("  well {} {place}, rate {} (SI)", well.name, number(well.rate)));
+        let carrying = if well.carrying.is_empty() {
+            String::new()
+        } else {
+            format!(", carrying {} (SI)", carried(plan, &well.carrying))
+        };
+        lines.push(format!("  well {} {place}, rate {} (SI){carrying}", well.name, number(well.rate)));
     }
     lines
 }
@@ -229,15 +264,14 @@ fn part(plan: &Plan, patch: &Patch, normal: usize) -> String {
     text
 }
 
+/// Concentrations of all species.
+fn carried(plan: &Plan, tapes: &[Tape]) -> String {
+    let of = |(idx, of): (usize, &Tape)| format!("{} = {}", carrier(plan, idx), tape(of, ""));
+    let parts: Vec<String> = tapes.iter().enumerate().map(of).collect();
+    if parts.is_empty() { "nothing".to_owned() } else { parts.join(", ") }
+}
+
 fn rule(plan: &Plan, rule: &SideRule) -> String {
-    let carried = |tapes: &[Tape]| {
-        let parts: Vec<String> = tapes
-            .iter()
-            .enumerate()
-            .map(|(idx, of)| format!("{} = {}", carrier(plan, idx), tape(of, "")))
-            .collect();
-        if parts.is_empty() { "nothing".to_owned() } else { parts.join(", ") }
-    };
     match rule {
         SideRule::Reflect => "reflect".to_owned(),
         SideRule::Periodic => "periodic".to_owned(),
@@ -245,8 +279,8 @@ fn rule(plan: &Plan, rule: &SideRule) -> String {
         SideRule::Absorb => "absorb".to_owned(),
         SideRule::Partial(rate) => format!("absorb at {} m/s", number(*rate)),
         SideRule::Outflow => "outflow".to_owned(),
-        SideRule::Inflow(tapes) => format!("inflow with {} (SI)", carried(tapes)),
-        SideRule::Held(tapes) => format!("held at {} (SI)", carried(tapes)),
+        SideRule::Inflow(tapes) => format!("inflow with {} (SI)", carried(plan, tapes)),
+        SideRule::Held(tapes) => format!("held at {} (SI)", carried(plan, tapes)),
     }
 }
 
@@ -265,10 +299,12 @@ fn source_line(plan: &Plan, source: &Source) -> String {
     let per = ["/m^2", "/m", ""][plan.axes.len().clamp(1, 3) - 1];
     let (from, to) = source.during;
     let window = format!("from {} to {} s", number(from), number(to));
-    let what = match source.strength {
-        Strength::Pulse(amount) => format!("{} {unit}{per} at once", number(amount)),
-        Strength::Rate(rate) => format!("{} {unit}{per}/s {window}", number(rate)),
-        Strength::Held(c) => format!("held at {} {unit}/m^3 {window}", number(c)),
+    let what = match &source.strength {
+        Strength::Pulse(amount) => format!("{} {unit}{per} at once", number(*amount)),
+        Strength::Rate(rate) => format!("{} {unit}{per}/s {window}", number(*rate)),
+        Strength::Held(c) => format!("held at {} {unit}/m^3 {window}", number(*c)),
+        Strength::RateInTime(of) => format!("{}, in {unit}{per}/s, {window}", tape(of, "")),
+        Strength::HeldInTime(of) => format!("held at {}, in {unit}/m^3, {window}", tape(of, "")),
     };
     format!("source {}: {} of {} {region}", source.name, what, name(plan, source.species))
 }

@@ -30,8 +30,9 @@ pub fn lower(scenario: &Scenario) -> Result<Lowered, Vec<Diagnostic>> {
         scenario.domain.axes.iter().zip(bins).map(|(axis, bins)| lower_axis(axis, bins)).collect();
     let decay = lower_decay::decay(scenario)?;
     let network = lower_chemistry::network(scenario, &axes)?;
-    let transport = lower_transport::transport(scenario, &axes, &network, decay)?;
-    let Network { species, components, chemistry, warnings, .. } = network;
+    let (transport, told) = lower_transport::transport(scenario, &axes, &network, decay)?;
+    let Network { species, components, chemistry, mut warnings, .. } = network;
+    warnings.extend(told);
     let extent: f64 = axes.iter().map(|axis| axis.high - axis.low).product();
     // A particle is a volume of water.
     let porosity = match &transport {

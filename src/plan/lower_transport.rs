@@ -8,36 +8,40 @@ use super::build_tape::build_tape;
 use super::burnett_frind::uniform_tensor;
 use super::lower::too_large;
 use super::lower_chemistry::Network;
+use super::periods::{Periods, TimedSide};
 use super::shares;
 use super::tape::{Binary, Operation, Tape};
 use super::transport::{
-    Conductivity, Darcy, DarcySide, Decay, Dispersion, FileFlow, Flow, Interface, Patch, Population, Region,
+    Change, Conductivity, Darcy, Decay, Dispersion, FileFlow, Flow, Interface, Patch, Population, Region,
     SideRule, Source, Strength, Transport, Well,
 };
-use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::R104;
+use crate::diagnostic::{Diagnostic, any_fatal};
 use crate::scenario::expression::{Expr, Type};
 use crate::scenario::transport as written;
 use crate::scenario::{self, Scenario};
 use crate::source::Span;
 use crate::units::Dimension;
 
-/// The transport of a scene; `None` where the walk of fluid with constant coefficients says everything.
+/// A transport, and warnings.
+type Told = (Option<Transport>, Vec<Diagnostic>);
+
+/// The transport of a scene; none where the walk of fluid with constant coefficients says everything.
 pub(super) fn transport(
     scenario: &Scenario,
     axes: &[Axis],
     network: &Network,
     decay: Option<Decay>,
-) -> Result<Option<Transport>, Vec<Diagnostic>> {
+) -> Result<Told, Vec<Diagnostic>> {
     let is_of_fluid = scenario.particles.shares.is_none();
     if is_of_fluid && is_plain(scenario) {
-        return Ok(None);
+        return Ok((None, Vec::new()));
     }
     let totals = is_of_fluid.then_some((&network.totals[..], network.components.len()));
     let mut lowering = Lowering { scenario, axes, totals, problems: Vec::new() };
     let transport = lowering.transport(decay);
     match transport {
-        Some(transport) if lowering.problems.is_empty() => Ok(Some(transport)),
+        Some(transport) if !any_fatal(&lowering.problems) => Ok((Some(transport), lowering.problems)),
         _ => Err(lowering.problems),
     }
 }
@@ -79,14 +83,16 @@ struct Lowering<'a> {
 
 impl Lowering<'_> {
     fn transport(&mut self, decay: Option<Decay>) -> Option<Transport> {
-        let flow = self.flow()?;
+        let (flow, changes) = self.flow()?;
         let (dispersion, own) = self.dispersion()?;
         let porosity = match &self.scenario.medium {
             Some(porosity) => self.tape(&porosity.value, porosity.span)?,
             None => constant(1.0),
         };
         let sides = self.sides()?;
-        let sources = self.scenario.sources.iter().map(|source| self.source(source)).collect();
+        let sources: Vec<Option<Source>> =
+            self.scenario.sources.iter().map(|source| self.source(source)).collect();
+        let sources = sources.into_iter().collect::<Option<_>>()?;
         let is_of_fluid = self.totals.is_some();
         let populations = if is_of_fluid { Vec::new() } else { self.populations(own)? };
         let is_on_cells = matches!(flow, Flow::Darcy(_) | Flow::File(_));
@@ -95,6 +101,7 @@ impl Lowering<'_> {
         let interfaces = self.interfaces(&dispersion, of_porosity);
         let mut transport = Transport {
             flow,
+            changes,
             dispersion,
             porosity,
             sides,
@@ -127,20 +134,21 @@ impl Lowering<'_> {
         self.axes.iter().map(|axis| all[axis.index]).collect()
     }
 
-    fn flow(&mut self) -> Option<Flow> {
+    fn flow(&mut self) -> Option<(Flow, Vec<Change>)> {
         let scenario = self.scenario;
         let frame = scenario.domain.frame;
-        Some(match scenario.flow.as_ref().map(|flow| (&flow.value, flow.span)) {
+        let flow = match scenario.flow.as_ref().map(|flow| (&flow.value, flow.span)) {
             None => Flow::Uniform(self.along_axes(frame.map(|v| 0.0 - v))),
             Some((written::Flow::Uniform(velocity), _)) => {
                 let relative = [0, 1, 2].map(|index| velocity[index] - frame[index]);
                 Flow::Uniform(self.along_axes(relative))
             }
-            Some((written::Flow::Expression(list), _)) => {
+            Some((written::Flow::Expression(list, changes), span)) => {
                 let tapes: Vec<Option<Tape>> = list.iter().map(|expr| self.tape(expr, expr.span)).collect();
-                Flow::Expression(tapes.into_iter().collect::<Option<_>>()?)
+                let tapes: Vec<Tape> = tapes.into_iter().collect::<Option<_>>()?;
+                return self.periods().velocity(&tapes, changes, span);
             }
-            Some((written::Flow::Darcy(darcy), _)) => Flow::Darcy(Box::new(self.darcy(darcy)?)),
+            Some((written::Flow::Darcy(darcy), span)) => return self.darcy(darcy, span),
             Some((written::Flow::File(flow), span)) => {
                 let Some(facts) = flow.facts.clone() else {
                     self.problems.push(unread(span));
@@ -148,16 +156,16 @@ impl Lowering<'_> {
                 };
                 Flow::File(Box::new(FileFlow { file: flow.file.clone(), facts }))
             }
-        })
+        };
+        Some((flow, Vec::new()))
     }
 
-    fn darcy(&mut self, darcy: &written::Darcy) -> Option<Darcy> {
-        let side = |side: written::DarcySide| match side {
-            written::DarcySide::Head(head) => DarcySide::Head(head),
-            written::DarcySide::Flux(flux) => DarcySide::Flux(flux),
-            written::DarcySide::NoFlow => DarcySide::NoFlow,
-            written::DarcySide::Periodic => DarcySide::Periodic,
-        };
+    fn periods(&mut self) -> Periods<'_> {
+        let duration = self.scenario.run.duration;
+        Periods { axes: self.axes, duration, problems: &mut self.problems }
+    }
+
+    fn darcy(&mut self, darcy: &written::Darcy, span: Span) -> Option<(Flow, Vec<Change>)> {
         let conductivity = match &darcy.conductivity {
             written::Conductivity::Expression(expr) => {
                 Conductivity::Expression(self.tape(expr, darcy.conductivity_span)?)
@@ -172,18 +180,36 @@ impl Lowering<'_> {
                 }
             }
         };
-        let well = |well: &written::Well| Well {
-            name: well.name.clone(),
-            low: self.along_axes(well.low),
-            high: self.along_axes(well.high),
-            rate: well.rate,
-        };
-        Some(Darcy {
+        let mut sides = Vec::new();
+        for [low, high] in &darcy.sides {
+            sides.push([self.darcy_side(low)?, self.darcy_side(high)?]);
+        }
+        let (mut wells, mut rates) = (Vec::new(), Vec::new());
+        for well in &darcy.wells {
+            rates.push(self.tape(&well.rate, well.rate.span)?);
+            let carrying = match well.carrying.is_empty() {
+                true => Vec::new(),
+                false => self.concentrations(&well.carrying)?,
+            };
+            let (low, high) = (self.along_axes(well.low), self.along_axes(well.high));
+            wells.push(Well { name: well.name.clone(), low, high, rate: 0.0, carrying });
+        }
+        let first = Darcy {
             cells: darcy.cells.clone(),
-            sides: darcy.sides.iter().map(|&[low, high]| [side(low), side(high)]).collect(),
+            sides: Vec::new(),
             conductivity,
             anisotropy: darcy.anisotropy.clone(),
-            wells: darcy.wells.iter().map(well).collect(),
+            wells,
+        };
+        self.periods().darcy(first, &sides, &rates, &darcy.changes, span)
+    }
+
+    fn darcy_side(&mut self, side: &written::DarcySide) -> Option<TimedSide> {
+        Some(match side {
+            written::DarcySide::Head(head) => TimedSide::Head(self.tape(head, head.span)?),
+            written::DarcySide::Flux(flux) => TimedSide::Flux(self.tape(flux, flux.span)?),
+            written::DarcySide::NoFlow => TimedSide::NoFlow,
+            written::DarcySide::Periodic => TimedSide::Periodic,
         })
     }
 
@@ -301,7 +327,7 @@ impl Lowering<'_> {
         }
     }
 
-    fn source(&self, source: &written::Source) -> Source {
+    fn source(&mut self, source: &written::Source) -> Option<Source> {
         let along = |all| self.along_axes(all);
         let region = match &source.region {
             written::Region::Point(at) => Region::Point(along(*at)),
@@ -312,13 +338,19 @@ impl Lowering<'_> {
             }
             written::Region::Table(cloud) => Region::Table(cloud.clone()),
         };
-        let strength = match source.strength {
-            written::Strength::Pulse(amount) => Strength::Pulse(amount),
-            written::Strength::Rate(rate) => Strength::Rate(rate),
-            written::Strength::Held(c) => Strength::Held(c),
+        let strength = match &source.strength {
+            written::Strength::Pulse(amount) => Strength::Pulse(*amount),
+            written::Strength::Rate(rate) => match rate.value() {
+                Some(rate) => Strength::Rate(rate),
+                None => Strength::RateInTime(self.tape(rate, rate.span)?),
+            },
+            written::Strength::Held(c) => match c.value() {
+                Some(c) => Strength::Held(c),
+                None => Strength::HeldInTime(self.tape(c, c.span)?),
+            },
         };
         let during = source.during.unwrap_or((0.0, 0.0));
-        Source { name: source.name.clone(), species: source.species, region, strength, during }
+        Some(Source { name: source.name.clone(), species: source.species, region, strength, during })
     }
 
     fn populations(&mut self, own: Option<f64>) -> Option<Vec<Population>> {

@@ -5,6 +5,7 @@
 //! transport hangs on an estimate.
 
 use super::Axis;
+use super::in_time::{at_time, is_timed, switches};
 use super::tape::{Operation, Tape};
 use super::transport::{
     Conductivity, Darcy, DarcySide, Dispersion, Flow, Patch, Population, Region, SideRule, Strength,
@@ -54,7 +55,8 @@ fn volume(axes: &[Axis]) -> f64 {
     axes.iter().map(|axis| axis.high - axis.low).product()
 }
 
-/// Largest speed of a flow that is known, and a mean one of a flow that is still to be solved, m/s.
+/// Largest speed of a flow that is known, and a mean one of a flow that is still to be solved, m/s; that of the
+/// fastest where flows follow one another.
 ///
 /// - Equation: `v = K_e |Δh| / (L φ)` or `q/φ`, whichever is largest over the axes.
 /// - Symbols: `Δh` difference of the heads of opposite sides `L` apart, `q` a given flux, φ mean porosity, `K_e`
@@ -64,7 +66,12 @@ fn volume(axes: &[Axis]) -> f64 {
 /// - Source: L. W. Gelhar, Stochastic Subsurface Hydrology (1993), section 4.1 (conjecture of Matheron).
 /// - Shape: one number.
 pub(super) fn speed(axes: &[Axis], transport: &Transport) -> f64 {
-    match &transport.flow {
+    let of = |flow: &Flow| speed_of(axes, flow, transport);
+    transport.flows().iter().map(of).fold(0.0, f64::max)
+}
+
+fn speed_of(axes: &[Axis], flow: &Flow, transport: &Transport) -> f64 {
+    match flow {
         Flow::Uniform(velocity) => velocity.iter().map(|v| v * v).sum::<f64>().sqrt(),
         Flow::Expression(tapes) => {
             let n_operations = tapes.iter().map(|tape| tape.operations.len()).max().unwrap_or(0);
@@ -171,7 +178,13 @@ fn masses(axes: &[Axis], transport: &Transport, population: &Population, speed: 
     let mut sum = mean(&population.initial, axes) * porosity * retardation * volume(axes);
     for source in transport.sources.iter().filter(|source| source.species == population.species) {
         let time = (source.during.1.min(duration) - source.during.0).max(0.0);
-        sum += match (source.strength, &source.region) {
+        let during = (source.during.0, source.during.1.min(duration));
+        let strength = match &source.strength {
+            Strength::RateInTime(tape) => Strength::Rate(mean_over(tape, axes, during)),
+            Strength::HeldInTime(tape) => Strength::Held(mean_over(tape, axes, during)),
+            constant => constant.clone(),
+        };
+        sum += match (strength, &source.region) {
             (Strength::Pulse(amount), _) => amount,
             (Strength::Rate(rate), _) => rate * time,
             (Strength::Held(c), Region::Box(low, high)) => {
@@ -180,7 +193,7 @@ fn masses(axes: &[Axis], transport: &Transport, population: &Population, speed: 
                 let shortest = widths.fold(f64::INFINITY, f64::min);
                 c * porosity * volume * (retardation + speed * time / shortest)
             }
-            (Strength::Held(_), _) => 0.0,
+            (Strength::Held(_) | Strength::RateInTime(_) | Strength::HeldInTime(_), _) => 0.0,
         };
     }
     let spread = spread(axes, &transport.dispersion, speed);
@@ -193,10 +206,41 @@ fn masses(axes: &[Axis], transport: &Transport, population: &Population, speed: 
                 _ => continue,
             };
             let Some(tape) = per_area.0.get(population.species) else { continue };
-            sum += mean(tape, axes) * porosity * area(patch, axis) * per_area.1;
+            sum += mean_over(tape, axes, (0.0, duration)) * porosity * area(patch, axis) * per_area.1;
+        }
+    }
+    if let Flow::Darcy(darcy) = &transport.flow {
+        for well in &darcy.wells {
+            let Some(tape) = well.carrying.get(population.species) else { continue };
+            sum += mean_over(tape, axes, (0.0, duration)) * well.rate.max(0.0) * duration;
         }
     }
     sum
+}
+
+/// Points in each piece of time between two switches.
+const TIMES: usize = 32;
+/// Pieces that are looked at so closely.
+const MOST_PIECES: usize = 64;
+
+/// Mean over the domain and a window of time, with all that is switched on and off in it.
+fn mean_over(tape: &Tape, axes: &[Axis], (from, to): (f64, f64)) -> f64 {
+    if !is_timed(tape) || from >= to {
+        return mean(tape, axes);
+    }
+    let mut middle = [0.0; 3];
+    axes.iter().for_each(|axis| middle[axis.index] = 0.5 * (axis.low + axis.high));
+    let mut edges = vec![from];
+    edges.extend(switches(tape, middle, from, to));
+    edges.push(to);
+    let n = if edges.len() > MOST_PIECES { 1 } else { TIMES };
+    let mut sum = 0.0;
+    for pair in edges.windows(2) {
+        let length = (pair[1] - pair[0]) / n as f64;
+        let at = |k: usize| mean(&at_time(tape, pair[0] + (k as f64 + 0.5) * length), axes);
+        sum += (0..n).map(at).sum::<f64>() * length;
+    }
+    sum / (to - from)
 }
 
 fn area(patch: &Patch, axis: usize) -> f64 {

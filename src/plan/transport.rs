@@ -18,7 +18,11 @@ use std::sync::Arc;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Transport {
+    /// The flow at the start.
     pub flow: Flow,
+    /// What it becomes later, in rising order of time; nothing where it is steady.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub changes: Vec<Change>,
     pub dispersion: Dispersion,
     /// Volume of water per volume of medium; 1 without a medium.
     pub porosity: Tape,
@@ -85,17 +89,66 @@ impl Transport {
         }
     }
 
-    /// What takes water out within the domain, and what is in it.
+    /// What takes water out within the domain at some time, and what is in it; and wells whose water carries something.
     pub fn outlets(&self) -> Vec<Outlet> {
+        let later = |idx: usize, change: &Change| match &change.flow {
+            Changed::Darcy { rates, .. } => rates.get(idx).is_some_and(|rate| *rate < 0.0),
+            Changed::Uniform(_) | Changed::Expression(_) => false,
+        };
+        let takes =
+            |idx: usize, well: &Well| well.rate < 0.0 || self.changes.iter().any(|change| later(idx, change));
         match &self.flow {
             Flow::Darcy(flow) => {
-                let wells = flow.wells.iter().enumerate().filter(|(_, well)| well.rate < 0.0);
+                let wells = flow.wells.iter().enumerate();
+                let wells = wells.filter(|(idx, well)| takes(*idx, well) || !well.carrying.is_empty());
                 wells.map(|(owner, well)| Outlet { name: well.name.clone(), owner }).collect()
             }
             Flow::File(flow) => flow.facts.outlets.clone(),
             Flow::Uniform(_) | Flow::Expression(_) => Vec::new(),
         }
     }
+
+    /// All flows, one after another.
+    pub fn flows(&self) -> Vec<Flow> {
+        let later = |change: &Change| match (&change.flow, &self.flow) {
+            (Changed::Uniform(velocity), _) => Flow::Uniform(velocity.clone()),
+            (Changed::Expression(tapes), _) => Flow::Expression(tapes.clone()),
+            (Changed::Darcy { sides, rates }, Flow::Darcy(first)) => {
+                let mut darcy = first.clone();
+                darcy.sides.clone_from(sides);
+                darcy.wells.iter_mut().zip(rates).for_each(|(well, &rate)| well.rate = rate);
+                Flow::Darcy(darcy)
+            }
+            (Changed::Darcy { .. }, other) => other.clone(),
+        };
+        [self.flow.clone()].into_iter().chain(self.changes.iter().map(later)).collect()
+    }
+
+    /// When a new flow begins, s; the first one at 0.
+    pub fn starts(&self) -> Vec<f64> {
+        [0.0].into_iter().chain(self.changes.iter().map(|change| change.from)).collect()
+    }
+}
+
+/// A new flow.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Change {
+    /// s
+    pub from: f64,
+    pub flow: Changed,
+}
+
+/// What of the flow is new, in the way that the first one is given.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Changed {
+    /// One velocity, an entry per active axis, m/s.
+    Uniform(Vec<f64>),
+    /// An expression of the place per active axis, m/s.
+    Expression(Vec<Tape>),
+    /// What the water does at the sides, and the rate of each well.
+    Darcy { sides: Vec<[DarcySide; 2]>, rates: Vec<f64> },
 }
 
 /// Where the water goes. Velocities are those of the water in its pores, relative to the frame.
@@ -164,6 +217,9 @@ pub struct Well {
     pub high: Vec<f64>,
     /// Water injected (positive) or taken out, m³/s; per m or m² with fewer axes.
     pub rate: f64,
+    /// Concentrations in the water that it puts in, one tape per species; none if it carries nothing.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub carrying: Vec<Tape>,
 }
 
 /// A flow in files of the scene's folder.
@@ -238,7 +294,7 @@ pub enum Region {
     Table(#[serde(with = "cloud::shared")] Arc<Cloud>),
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Strength {
     /// mol or kg at once (per m², m with fewer axes).
@@ -247,6 +303,10 @@ pub enum Strength {
     Rate(f64),
     /// mol/m³ or kg/m³ that the water there is kept at.
     Held(f64),
+    /// A rate that changes, by an expression of the time.
+    RateInTime(Tape),
+    /// A concentration that changes.
+    HeldInTime(Tape),
 }
 
 /// Particles that carry the mass of one species.

@@ -4,6 +4,8 @@
 //! refuses only what is wrong at a place that it can name.
 
 use super::Axis;
+use super::build_tape::build_tape;
+use super::in_time::{is_timed, switches};
 use super::limits::short;
 use super::shares::places;
 use super::tape::Tape;
@@ -12,15 +14,18 @@ use super::transport::{Conductivity, Flow, Transport};
 use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{M005, M029};
 use crate::scenario::Scenario;
+use crate::scenario::expression::Expr;
 use crate::scenario::transport as written;
 use crate::source::Span;
 
 /// Largest divergence times extent over the largest discharge.
 const LARGEST_DIVERGENCE: f64 = 1e-6;
+/// Times at which what enters is looked at, beside those between its switches.
+const TIMES: usize = 64;
 
 /// Everything that is wrong with the fields of a scene with masses.
 pub(super) fn check(scenario: &Scenario, axes: &[Axis], transport: &Transport) -> Vec<Diagnostic> {
-    let mut problems = Vec::new();
+    let mut problems = amounts(scenario, axes);
     if let Some(medium) = &scenario.medium {
         let is_right = |value: f64| value > 0.0 && value <= 1.0;
         let rule = "above 0, at most 1";
@@ -36,8 +41,12 @@ pub(super) fn check(scenario: &Scenario, axes: &[Axis], transport: &Transport) -
     }
     let flow = scenario.flow.as_ref().map(|flow| (&flow.value, flow.span));
     match (&transport.flow, flow) {
-        (Flow::Expression(tapes), Some((_, span))) => {
-            problems.extend(divergence(axes, tapes, &transport.porosity, span));
+        (Flow::Uniform(_) | Flow::Expression(_), Some((_, span))) => {
+            let of = |flow: &Flow| match flow {
+                Flow::Expression(tapes) => divergence(axes, tapes, &transport.porosity, span),
+                _ => None,
+            };
+            problems.extend(transport.flows().iter().find_map(of));
         }
         (Flow::Darcy(darcy), Some((written::Flow::Darcy(own), _))) => {
             if let Conductivity::Expression(tape) = &darcy.conductivity {
@@ -57,6 +66,67 @@ pub(super) fn check(scenario: &Scenario, axes: &[Axis], transport: &Transport) -
         _ => {}
     }
     problems
+}
+
+/// Concentrations and rates that enter and are below zero at some place or time.
+fn amounts(scenario: &Scenario, axes: &[Axis]) -> Vec<Diagnostic> {
+    let mut list: Vec<(&Expr, String)> = Vec::new();
+    let name = |species: usize| scenario.species.get(species).map_or("", |species| species.name.as_str());
+    for patch in scenario.domain.axes.iter().flat_map(|axis| axis.patches.iter().flatten()) {
+        if let written::SideRule::Inflow(own) | written::SideRule::Held(own) = &patch.rule {
+            list.extend(
+                own.iter().map(|(species, c)| (c, format!("the concentration of `{}`", name(*species)))),
+            );
+        }
+    }
+    for source in &scenario.sources {
+        if let written::Strength::Rate(value) | written::Strength::Held(value) = &source.strength {
+            list.push((value, format!("what source `{}` gives", source.name)));
+        }
+    }
+    if let Some(written::Flow::Darcy(darcy)) = scenario.flow.as_ref().map(|flow| &flow.value) {
+        for well in &darcy.wells {
+            list.extend(well.carrying.iter().map(|(_, c)| (c, format!("what well `{}` carries", well.name))));
+        }
+    }
+    let is_new = |(expr, _): &(&Expr, String)| expr.value().is_none();
+    list.into_iter()
+        .filter(is_new)
+        .filter_map(|(expr, what)| below_zero(scenario, axes, expr, &what))
+        .collect()
+}
+
+fn below_zero(scenario: &Scenario, axes: &[Axis], expr: &Expr, what: &str) -> Option<Diagnostic> {
+    let tape = build_tape(expr, &scenario.species)?;
+    let duration = scenario.run.duration;
+    let middle = |axis: &Axis| (axis.index, 0.5 * (axis.low + axis.high));
+    let mut place = [0.0; 3];
+    axes.iter().map(middle).for_each(|(index, x)| place[index] = x);
+    let mut edges = switches(&tape, place, 0.0, duration);
+    edges.truncate(TIMES);
+    edges.extend((0..=TIMES).map(|k| duration * k as f64 / TIMES as f64));
+    edges.sort_by(f64::total_cmp);
+    let times: Vec<f64> = match is_timed(&tape) {
+        true => edges.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect(),
+        false => vec![0.0],
+    };
+    for t in times {
+        let mut all = places(axes, usize::MAX);
+        all.iter_mut().for_each(|place| place[3] = t);
+        let is_wrong = |place: &&[f64; 4]| {
+            let value = tape.evaluate(&place[..]);
+            !(value >= 0.0 && value.is_finite())
+        };
+        let Some(place) = all.iter().find(is_wrong) else { continue };
+        let found =
+            format!("{} (SI) at {}, t = {} s", short(tape.evaluate(place)), shown(axes, place), short(t));
+        let message = Diagnostic::error(M005, format!("{what} is out of range"))
+            .at(expr.span, format!("this is {found}"))
+            .found(found)
+            .expected("zero or more at all places and times");
+        return Some(message);
+    }
+    None
 }
 
 fn outside(

@@ -28,6 +28,7 @@ pub(super) struct Allow {
 impl Allow {
     pub(super) const CONSTANT: Self = Self { position: false, time: false, species: false, results: false };
     pub(super) const PLACE: Self = Self { position: true, time: false, species: false, results: false };
+    pub(super) const TIME: Self = Self { position: false, time: true, species: false, results: false };
     pub(super) const INITIAL: Self = Self { position: true, time: false, species: true, results: false };
     pub(super) const RATE: Self = Self { position: true, time: true, species: true, results: false };
     pub(super) const REFERENCE: Self = Self { position: true, time: true, species: false, results: false };

@@ -131,6 +131,13 @@ impl Expr {
         found
     }
 
+    /// Whether the time is named in it.
+    pub fn reads_time(&self) -> bool {
+        let mut found = false;
+        self.walk(&mut |expr| found |= expr.node == Node::Time);
+        found
+    }
+
     /// Calls `visit` on this expression and everything below it.
     pub fn walk(&self, visit: &mut impl FnMut(&Expr)) {
         visit(self);

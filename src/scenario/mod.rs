@@ -114,7 +114,7 @@ impl Scenario {
         let flows = match self.flow.as_ref().map(|flow| &flow.value) {
             None => false,
             Some(Flow::Uniform(velocity)) => velocity.iter().any(|v| *v != 0.0),
-            Some(Flow::Expression(_) | Flow::Darcy(_) | Flow::File(_)) => true,
+            Some(Flow::Expression(..) | Flow::Darcy(_) | Flow::File(_)) => true,
         };
         let disperses = match self.dispersion.as_ref().map(|dispersion| &dispersion.value) {
             None => false,

@@ -201,12 +201,15 @@ fn initial_of<'a>(
 }
 
 /// A species without an initial concentration takes the dimension of what enters at a side, is held there or
-/// comes from a source. Mistakes in these values are told where they are read.
+/// comes from a well or a source. Mistakes in these values are told where they are read.
 fn infer_dimensions<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) {
     let n_axes = checker.axes.len();
-    let at_sides = statements.boundaries.iter().flat_map(|it| &it.carried).map(|it| (it, true));
-    let of_sources = statements.sources.iter().flat_map(|(_, it)| &it.carried).map(|it| (it, false));
-    for (assignment, is_concentration) in at_sides.chain(of_sources) {
+    let at_sides = statements.boundaries.iter().flat_map(|it| &it.carried);
+    let at_sides = at_sides.map(|it| (it, true, Allow::REFERENCE));
+    let of_wells = wells(statements).flat_map(|it| &it.carrying).map(|it| (it, true, Allow::TIME));
+    let of_sources = statements.sources.iter().flat_map(|(_, it)| &it.carried);
+    let of_sources = of_sources.map(|it| (it, false, Allow::TIME));
+    for (assignment, is_concentration, allow) in at_sides.chain(of_wells).chain(of_sources) {
         let Some(Origin::Species(idx)) = checker.scope.get(&assignment.name.value).map(|it| it.origin) else {
             continue;
         };
@@ -215,7 +218,7 @@ fn infer_dimensions<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) 
         }
         let kind = match checker.kind_of_column(&assignment.value) {
             Some(kind) => Some(kind),
-            None => checker.check(&assignment.value, Allow::PLACE).map(|value| value.kind),
+            None => checker.check(&assignment.value, allow).map(|value| value.kind),
         };
         let Some(kind) = kind else { continue };
         checker.species_dimensions[idx] = match kind {
@@ -226,6 +229,18 @@ fn infer_dimensions<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) 
             kind => super::transport::source::concentration_for(kind, n_axes),
         };
     }
+}
+
+/// The wells of a flow.
+fn wells<'a>(statements: &Statements<'a>) -> impl Iterator<Item = &'a tree::Well> {
+    let entries = match statements.flow.map(|(_, flow)| &flow.argument) {
+        Some(tree::FlowArgument::Entries(entries)) => &entries[..],
+        _ => &[],
+    };
+    entries.iter().filter_map(|entry| match &entry.kind {
+        tree::DarcyKind::Well(well) => Some(&**well),
+        _ => None,
+    })
 }
 
 /// A species without a dimension of its own takes that of its reaction's other species.

@@ -275,7 +275,11 @@ pub(super) fn check_wells(checker: &mut Checker<'_>, scenario: &Scenario) {
     };
     for output in &scenario.outputs {
         let Some(Station::Well(name)) = &output.station else { continue };
-        if flow.wells.iter().any(|well| well.name == *name && well.rate >= 0.0) {
+        if flow
+            .wells
+            .iter()
+            .any(|well| well.name == *name && well.rate.value().is_some_and(|rate| rate >= 0.0))
+        {
             checker.report(
                 Diagnostic::error(M005, format!("well `{name}` takes nothing out"))
                     .at(output.span, "what leaves with the water of a well is counted")

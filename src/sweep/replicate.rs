@@ -8,7 +8,7 @@ use super::{Key, Scene, key_text};
 use crate::diagnostic::codes;
 use crate::engine::snapshot::{Outcome, Snapshot, Values};
 use crate::engine::{self, Control, RunError};
-use crate::flow::FaceFlow;
+use crate::flow::FlowSeries;
 use crate::flow::statistics::Statistics;
 use crate::measure::{self, Evaluated};
 use crate::plan::compile::Compiled;
@@ -18,7 +18,6 @@ use crate::report;
 use crate::scenario::Scenario;
 use crate::stop;
 use crate::table::{ErrorRow, PointRow, Status, Value};
-use std::sync::Arc;
 use std::time::Instant;
 
 /// A plan with the seed of one replicate.
@@ -113,7 +112,7 @@ impl Task<'_> {
     }
 
     /// The flow that this plan shares with others of the sweep.
-    fn flow(&self) -> Result<Option<Arc<FaceFlow>>, RunError> {
+    fn flow(&self) -> Result<Option<FlowSeries>, RunError> {
         let flow = self.scene.flows.of(&self.plan, &self.scene.sources);
         flow.map_err(|error| RunError::Flow(error.to_string()))
     }

@@ -13,8 +13,8 @@ pub use data::{Data, DataColumn};
 pub use outputs::{Output, Place, Times};
 pub use study::{Criterion, Expect, Replicates, Report, Sweep, SweepAxis, SweepEntry, SweepValue, Use};
 pub use transport::{
-    Boundary, Column, DarcyEntry, DarcyKind, Dispersion, FileEntry, FileValue, Flow, FlowArgument,
-    RegionArgument, Source, Well,
+    Boundary, Change, ChangeTimes, Column, DarcyEntry, DarcyKind, Dispersion, FileEntry, FileValue, Flow,
+    FlowArgument, RegionArgument, Source, Well,
 };
 
 /// A name with its place.

@@ -14,7 +14,7 @@ use super::run::Run;
 impl<const D: usize, M: Medium<D>> Run<'_, D, M> {
     /// What is there at the start.
     pub fn start(&mut self) -> Result<(), RunError> {
-        let window = Window { step: 0, t: 0.0, dt: 1.0 };
+        let window = Window { step: 0, t: 0.0, dt: 1.0, period: 0, part: 1.0 };
         let mut births = Vec::new();
         for release in &self.releases {
             if matches!(release.kind, Kind::Steady { from: 0.0, to: 0.0, .. }) {
@@ -64,7 +64,8 @@ impl<const D: usize, M: Medium<D>> Run<'_, D, M> {
     pub fn empty_boxes(&mut self, t: f64) {
         let mut events = Vec::new();
         for release in &self.releases {
-            let Kind::Filled { low, high, from, to, .. } = &release.kind else { continue };
+            let Kind::Filled { boxes, from, to, .. } = &release.kind else { continue };
+            let Some((_, low, high)) = boxes.get(self.period) else { continue };
             if t < *from || t >= *to {
                 continue;
             }

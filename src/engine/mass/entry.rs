@@ -8,6 +8,8 @@ use crate::maths::scalar::{erf, erfc, exp};
 const STILL: f64 = 1e-4;
 /// Halvings of the search for a depth: 1e-15 of the deepest.
 const HALVINGS: usize = 50;
+/// Points of the mean time of what has entered.
+const LAG_POINTS: usize = 32;
 
 /// A half space that begins empty and whose edge is held at 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -66,6 +68,26 @@ impl Entry {
         let z = a / s;
         let carried = 0.5 * s * (exp(-z * z) / std::f64::consts::PI.sqrt() + z * erfc(-z));
         carried + self.dispersion / self.velocity * erf(z)
+    }
+
+    /// How long ago what is there entered, on average, s.
+    ///
+    /// - Equation: `∫₀^t s g(s) ds / G(t) = t − ∫₀^t G(s) ds / G(t)`, `g = dG/dt`, by the midpoint rule in `√s`.
+    /// - Symbols: `G` of [`Entry::total`].
+    /// - Range: any velocity: `t/3` without flow, `t/2` without dispersion.
+    /// - Source: integration by parts.
+    /// - Shape: one number.
+    pub fn lag(self) -> f64 {
+        let whole = self.total();
+        if whole <= 0.0 {
+            return 0.5 * self.time;
+        }
+        let at = |k: usize| {
+            let part = (k as f64 + 0.5) / LAG_POINTS as f64;
+            2.0 * part * Entry { time: self.time * part * part, ..self }.total()
+        };
+        let mean = (0..LAG_POINTS).map(at).sum::<f64>() / LAG_POINTS as f64;
+        self.time * (1.0 - mean / whole)
     }
 
     /// Depth beyond which a share `uniform` of what has entered lies.
@@ -147,6 +169,7 @@ mod tests {
         let still = Entry { velocity: 0.0, dispersion: 2.0, time: 3.0 };
         assert!((still.total() - 2.0 * (6.0 / std::f64::consts::PI).sqrt()).abs() < 1e-14);
         let carried = Entry { velocity: 2.0, dispersion: 0.0, time: 3.0 };
+        assert!((still.lag() - 1.0).abs() < 1e-3 && (carried.lag() - 1.5).abs() < 1e-3);
         assert_eq!(carried.total(), 6.0);
         assert!((carried.depth(0.5) - 3.0).abs() < 1e-13);
     }

@@ -3,7 +3,8 @@
 //! Owns the bins of breakthroughs and first passages. May use exact sums and the plan. It deliberately moves
 //! nothing: it is told what happened.
 
-use super::super::schedule::{Due, step_length};
+use super::super::calendar::Calendar;
+use super::super::schedule::Due;
 use super::super::snapshot::{Row, Snapshot, Values};
 use super::super::track::monitors::{Gap, Part, Plane, Watch};
 use super::book::{Event, What};
@@ -32,8 +33,9 @@ pub struct Gate {
     output_idx: usize,
     trigger: Trigger,
     is_first_passage: bool,
-    /// Water through the place in the direction that counts, m³/s (m², m with fewer axes).
-    water: f64,
+    station: Station,
+    /// Water through the place in the direction that counts, m³/s (m², m with fewer axes), and since when.
+    water: Vec<(f64, f64)>,
     /// Populations of the output's species.
     populations: Vec<Option<usize>>,
     times: Vec<f64>,
@@ -63,12 +65,12 @@ pub struct Gates {
 }
 
 impl Gates {
-    /// Takes the outputs of gates out of the dues. `water` tells how much goes through a station.
+    /// Takes the outputs of gates out of the dues.
     pub fn new<const D: usize>(
         plan: &Plan,
+        calendar: &Calendar,
         dues: &mut Vec<Due>,
         monitors: &mut Monitors<D>,
-        water: impl Fn(&Station) -> f64,
     ) -> Self {
         let mut gates = Vec::new();
         let has_sub_steps = plan.transport.as_ref().is_some_and(|transport| transport.sub_steps.is_some());
@@ -84,10 +86,9 @@ impl Gates {
                 (false, false) => Watch::Ends,
             };
             let Some(trigger) = monitors.trigger(plan, station, watch) else { continue };
-            let time = &plan.time;
             let end = |due: &Due| match due.fraction == 0.0 {
-                true if due.steps >= time.n_steps => f64::INFINITY,
-                true => due.steps as f64 * time.step + SLACK * step_length(time, due.steps),
+                true if due.steps >= calendar.n_steps() => f64::INFINITY,
+                true => calendar.start(due.steps) + SLACK * calendar.length(due.steps),
                 false => due.t,
             };
             let n_times = own.len();
@@ -95,7 +96,8 @@ impl Gates {
                 output_idx,
                 trigger,
                 is_first_passage,
-                water: water(station),
+                station: station.clone(),
+                water: Vec::new(),
                 populations: populations(plan, output),
                 times: own.iter().map(|due| due.t).collect(),
                 ends: own.iter().map(|due| end(due)).collect(),
@@ -111,6 +113,13 @@ impl Gates {
         }
         dues.retain(|due| !due.outputs.is_empty());
         Self { gates, n_planes: monitors.planes.len() }
+    }
+
+    /// Asks how much water goes through each place from a time on.
+    pub fn look(&mut self, from: f64, water: impl Fn(&Station) -> f64) {
+        for gate in &mut self.gates {
+            gate.water.push((from, water(&gate.station)));
+        }
     }
 
     pub fn are_none(&self) -> bool {
@@ -266,9 +275,21 @@ impl Gate {
         snapshots
     }
 
+    /// Water per time, on average between two times.
+    fn water_between(&self, from: f64, to: f64) -> f64 {
+        if let [(_, water)] = self.water[..] {
+            return water;
+        }
+        let ends = self.water.iter().skip(1).map(|it| it.0).chain([f64::INFINITY]);
+        let volume =
+            |(&(start, water), end): (&(f64, f64), f64)| water * (end.min(to) - start.max(from)).max(0.0);
+        self.water.iter().zip(ends).map(volume).sum::<f64>() / (to - from)
+    }
+
     fn hand_out(&mut self, bin: usize) -> Snapshot {
         let t = self.times[bin];
         let dt = t - if bin == 0 { 0.0 } else { self.times[bin - 1] };
+        let water = self.water_between(t - dt, t);
         let known = |value: f64, is_known: bool| if is_known { value } else { f64::NAN };
         let mut rows = Vec::new();
         for (bins, so_far) in self.bins.iter().zip(&mut self.so_far) {
@@ -276,7 +297,7 @@ impl Gate {
             so_far.merge(net);
             // Not a number at once: 0 / 0 and x / 0 have no value.
             let rate = known(net.value() / dt, dt > 0.0);
-            let concentration = known(rate / self.water, self.water != 0.0);
+            let concentration = known(rate / water, water != 0.0);
             let numbers = match self.is_first_passage {
                 true => vec![so_far.value(), rate, n as f64],
                 false => vec![concentration, rate, so_far.value(), n as f64],

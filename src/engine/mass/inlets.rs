@@ -4,12 +4,14 @@
 //! and `track`. It deliberately draws nothing.
 
 use super::super::track::medium::{Medium, spread_at};
-use super::super::track::tracker::Tracker;
 use super::entry::Entry;
-use super::parts::{Part, Shape};
+use super::in_time::Course;
+use super::pace::Pace;
+use super::parts::{Deep, Part, Shape};
 use super::place::{Faces, Place};
 use super::release::Sampling;
 use super::world::Site;
+use crate::plan::in_time::{bounds, is_timed};
 use crate::plan::tape::{Operation, Tape};
 use crate::plan::transport::{Dispersion, Flow, Patch, SideRule};
 
@@ -18,64 +20,172 @@ use crate::plan::transport::{Dispersion, Flow, Patch, SideRule};
 const CUTS: [usize; 2] = [1024, 128];
 const HELD_CUTS: [usize; 2] = [64, 16];
 
-impl<const D: usize> Site<'_, D> {
-    /// What enters through a patch of a side.
-    pub fn side<M: Medium<D>>(
-        &self,
-        tracker: &Tracker<D, M>,
-        population: usize,
-        [axis, end]: [usize; 2],
-        idx: usize,
-    ) -> Vec<Part<D>> {
-        let patch = &self.transport.sides[axis][end][idx];
-        let of = &self.transport.populations[population];
-        let (tapes, is_held) = match &patch.rule {
-            SideRule::Inflow(tapes) => (tapes, false),
-            SideRule::Held(tapes) => (tapes, true),
-            _ => return Vec::new(),
+/// A patch of a side that gives mass of one population.
+pub struct Inlet<'a, const D: usize> {
+    population: usize,
+    axis: usize,
+    /// Into the domain.
+    sign: f64,
+    door: usize,
+    is_held: bool,
+    course: Course<'a, D>,
+    centres: Vec<[f64; D]>,
+    /// Per face.
+    porosity: Vec<f64>,
+    areas: Vec<f64>,
+    /// Per period and face: velocity inwards, m/s, and 2 D_nn, m²/s.
+    found: Vec<Vec<[f64; 2]>>,
+}
+
+impl<'a, const D: usize> Inlet<'a, D> {
+    /// Looks at the medium of the next period.
+    pub fn look<M: Medium<D>>(&mut self, site: &Site<D>, medium: &M) {
+        let carrier = site.carriers()[self.population];
+        let of = |centre: &[f64; D]| {
+            let inwards = self.sign * medium.velocity(*centre, self.axis);
+            let spread = if self.is_held { spread_at(medium, &carrier, *centre, self.axis) } else { 0.0 };
+            [inwards, spread]
         };
-        let Some(tape) = tapes.get(of.species) else { return Vec::new() };
-        let sign = if end == 0 { 1.0 } else { -1.0 };
-        let duration = self.plan.time.duration;
-        let door = 1 + self.transport.sources.len() + 2 * axis + end;
+        self.found.push(self.centres.iter().map(of).collect());
+    }
+
+    /// What enters.
+    pub fn parts(self, site: &Site<D>) -> Vec<Part<D>> {
+        if self.is_held {
+            return (0..self.centres.len()).map(|face| self.held(site, face)).collect();
+        }
+        let duration = site.plan.time.duration;
+        let water = |period: usize, face: usize| {
+            self.porosity[face] * self.areas[face] * self.found[period][face][0].max(0.0)
+        };
+        if is_timed(self.course.tape) || site.starts.len() > 1 {
+            let (pace, faces) = site.pace(&self.course, water);
+            let weights = self.course.faces.iter().map(|&(low, high)| (low, high, 1.0)).collect();
+            let place = Place::Faces(Faces::new(weights));
+            let mass = pace.total();
+            return vec![Part { door: self.door, mass, place, shape: Shape::Paced { pace, faces } }];
+        }
         let mut flux = Vec::new();
-        let mut parts = Vec::new();
-        for (low, high) in self.faces([axis, end], idx, (tape, if is_held { HELD_CUTS } else { CUTS })) {
-            let centre: [f64; D] = std::array::from_fn(|other| 0.5 * (low[other] + high[other]));
-            let area: f64 =
-                (0..D).filter(|&other| other != axis).map(|other| high[other] - low[other]).product();
-            let c = self.evaluate(tape, &[centre], 0.0)[0];
-            let porosity = self.porosity(&[centre])[0];
-            let inwards = sign * tracker.medium.velocity(centre, axis);
-            if !is_held {
-                flux.push((low, high, c * porosity * area * inwards.max(0.0)));
-                continue;
+        for (face, &(low, high)) in self.course.faces.iter().enumerate() {
+            let c = site.evaluate(self.course.tape, &[self.centres[face]], 0.0)[0];
+            let inwards = self.found[0][face][0].max(0.0);
+            flux.push((low, high, c * self.porosity[face] * self.areas[face] * inwards));
+        }
+        let faces = Faces::new(flux);
+        vec![Part {
+            door: self.door,
+            mass: faces.total() * duration,
+            place: Place::Faces(faces),
+            shape: Shape::Steady { from: 0.0, to: duration, sampling: Sampling::Stratified },
+        }]
+    }
+
+    /// What a face gives that is kept at a concentration.
+    fn held(&self, site: &Site<D>, face: usize) -> Part<D> {
+        let of = &site.transport.populations[self.population];
+        let carrier = site.carriers()[self.population];
+        let (low, high) = self.course.faces[face];
+        let entry = |period: usize, time: f64| {
+            let [inwards, spread] = self.found[period][face];
+            Entry { velocity: inwards * carrier.mobility, dispersion: 0.5 * spread, time }
+        };
+        let step = site.plan.time.step;
+        let density = |c: f64| c * self.porosity[face] * of.retardation * self.areas[face];
+        let entries: Vec<Entry> = (0..site.starts.len()).map(|period| entry(period, step)).collect();
+        let is_cut = site.calendar.n_steps() != site.plan.time.n_steps;
+        let (mass, course) = if !is_timed(self.course.tape) && !is_cut && site.starts.len() == 1 {
+            let c = site.evaluate(self.course.tape, &[self.centres[face]], 0.0)[0];
+            let mass = density(c) * entry(0, site.plan.time.duration).total();
+            (mass, Deep::Even { per_step: density(c) * entries[0].total() })
+        } else {
+            let pace =
+                self.held_pace(site, face, |period, time| density(1.0) * entry(period, time).total() / time);
+            (pace.total(), Deep::Paced(pace))
+        };
+        let shape = Shape::Held { course, entries, axis: self.axis, sign: self.sign };
+        Part { door: self.door, mass, place: Place::Box(low, high), shape }
+    }
+
+    /// Mass over time of a face that is held: `gives` says how much per time and concentration in a step of a length
+    /// during a period. Concentrations are those at the mean time of what is there at the end of the step.
+    fn held_pace(&self, site: &Site<D>, face: usize, gives: impl Fn(usize, f64) -> f64) -> Pace {
+        let centre = self.centres[face];
+        let tape = self.course.tape;
+        let duration = site.plan.time.duration;
+        let switches = site.switches(tape, &[centre], (0.0, duration));
+        let mut edges = site.calendar.seams();
+        edges.extend(switches.iter().copied().chain([0.0, duration]));
+        edges.sort_by(f64::total_cmp);
+        edges.dedup();
+        let mobility = site.carriers()[self.population].mobility;
+        let mut rates = |t: f64, values: &mut [f64]| {
+            let number = site.calendar.step_at(t);
+            let (period, time) = (site.period(number), site.calendar.length(number));
+            let [inwards, spread] = self.found[period][face];
+            let own = Entry { velocity: inwards * mobility, dispersion: 0.5 * spread, time };
+            let next = switches.partition_point(|&switch| switch <= t);
+            let last = switches.get(next).map_or(duration, |switch| switch - 1e-9 * time);
+            let seen = (t + 0.5 * time - own.lag()).min(last);
+            values[0] = site.evaluate(tape, &[centre], seen)[0] * gives(period, time);
+        };
+        let place = site.in_space(&centre);
+        let width = |from: f64, to: f64| {
+            let number = site.calendar.step_at(0.5 * (from + to));
+            let of = bounds(tape, place, from, to);
+            let width = of.high - of.low;
+            // Finer than a step nothing is told apart.
+            let is_fine = !is_timed(tape) || to - from <= site.calendar.length(number);
+            if is_fine { 0.0 } else { width * gives(site.period(number), site.calendar.length(number)) }
+        };
+        Pace::new(&edges, 1, &mut rates, &width).0
+    }
+}
+
+impl<const D: usize> Site<'_, D> {
+    /// Everything that lets a population in.
+    pub fn inlets(&self, population: usize) -> Vec<Inlet<'_, D>> {
+        let species = self.transport.populations[population].species;
+        let mut list = Vec::new();
+        for side in 0..2 * D {
+            let [axis, end] = [side / 2, side % 2];
+            for (idx, patch) in self.transport.sides[axis][end].iter().enumerate() {
+                let (tapes, is_held) = match &patch.rule {
+                    SideRule::Inflow(tapes) => (tapes, false),
+                    SideRule::Held(tapes) => (tapes, true),
+                    _ => continue,
+                };
+                let Some(tape) = tapes.get(species) else { continue };
+                let faces = match is_held {
+                    true => self.held_faces([axis, end], idx, tape),
+                    false => self.faces([axis, end], idx, (tape, CUTS)),
+                };
+                let course = Course { tape, faces, window: (0.0, self.plan.time.duration) };
+                let centres = course.centres();
+                let porosity = self.porosity(&centres);
+                let area = |(low, high): &([f64; D], [f64; D])| -> f64 {
+                    (0..D).filter(|&other| other != axis).map(|other| high[other] - low[other]).product()
+                };
+                let areas = course.faces.iter().map(area).collect();
+                list.push(Inlet {
+                    population,
+                    axis,
+                    sign: if end == 0 { 1.0 } else { -1.0 },
+                    door: 1 + self.transport.sources.len() + side,
+                    is_held,
+                    course,
+                    centres,
+                    porosity,
+                    areas,
+                    found: Vec::new(),
+                });
             }
-            let carrier = self.carriers()[population];
-            let entry = |time: f64| Entry {
-                velocity: inwards * carrier.mobility,
-                dispersion: 0.5 * spread_at(&tracker.medium, &carrier, centre, axis),
-                time,
-            };
-            let density = c * porosity * of.retardation * area;
-            let step = entry(self.plan.time.step);
-            parts.push(Part {
-                door,
-                mass: density * entry(duration).total(),
-                place: Place::Box(low, high),
-                shape: Shape::Held { per_step: density * step.total(), entry: step, axis, sign },
-            });
         }
-        if !is_held {
-            let faces = Faces::new(flux);
-            parts.push(Part {
-                door,
-                mass: faces.total() * duration,
-                place: Place::Faces(faces),
-                shape: Shape::Steady { from: 0.0, to: duration, sampling: Sampling::Stratified },
-            });
-        }
-        parts
+        list
+    }
+
+    /// The rectangles of a patch that is held at a concentration.
+    pub fn held_faces(&self, side: [usize; 2], idx: usize, tape: &Tape) -> Vec<([f64; D], [f64; D])> {
+        self.faces(side, idx, (tape, HELD_CUTS))
     }
 
     /// Rectangles of a patch that no earlier one holds, small enough to be looked at in the middle: what enters
@@ -124,8 +234,8 @@ impl<const D: usize> Site<'_, D> {
         earlier: &[Patch],
         (tape, cuts): (&Tape, [usize; 2]),
     ) -> Vec<f64> {
-        let is_constant = |tape: &Tape| matches!(tape.operations[..], [Operation::Constant(_)]);
-        let is_even = is_constant(tape)
+        let reads_place = |tape: &Tape| tape.operations.iter().any(|it| matches!(it, Operation::Input(0..3)));
+        let is_even = !reads_place(tape)
             && !self.has_smooth_pores()
             && !matches!(self.transport.flow, Flow::Expression(_))
             && !matches!(self.transport.dispersion, Dispersion::Isotropic(_));

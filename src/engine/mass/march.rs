@@ -112,7 +112,8 @@ impl<const D: usize, M: Medium<D>> Run<'_, D, M> {
             flock.push(birth.id, birth.position);
             entered[lane] = birth.entered;
             if turning.is_some() {
-                ages[lane] = self.releases[flock::origin(birth.id)].age(&self.stream, birth, steps.dt);
+                ages[lane] =
+                    self.releases[flock::origin(birth.id)].age(&self.stream, birth, (steps.dt, self.period));
             }
         }
         let carrier = self.carriers[flock.population];

@@ -14,18 +14,25 @@ use super::super::track::uneven::{Blend, Lengths, UnevenMedium};
 use super::super::track::uniform::Uniform;
 use super::run::{Sink, go};
 use super::world::Site;
-use crate::flow::{FaceFlow, build};
+use crate::flow::{FaceFlow, FlowSeries, build};
 use crate::plan::Plan;
 use crate::plan::burnett_frind::uniform_tensor;
 use crate::plan::tape::{Operation, Tape};
-use crate::plan::transport::{Dispersion, Flow};
-use std::sync::Arc;
+use crate::plan::transport::{Changed, Dispersion, Flow};
+
+/// The medium of each flow.
+pub type Media<'a, M> = &'a dyn Fn(usize) -> Result<M, RunError>;
 
 /// What is done in a medium, whichever it is.
 pub trait InMedium<const D: usize> {
     type Output;
 
-    fn go<M: Medium<D> + Send + 'static>(self, site: &Site<D>, medium: M) -> Result<Self::Output, RunError>;
+    /// `media` makes the medium of each flow.
+    fn go<M: Medium<D> + Send + 'static>(
+        self,
+        site: &Site<D>,
+        media: Media<M>,
+    ) -> Result<Self::Output, RunError>;
 }
 
 /// A run of masses.
@@ -38,8 +45,8 @@ struct Masses<'a> {
 impl<const D: usize> InMedium<D> for Masses<'_> {
     type Output = Outcome;
 
-    fn go<M: Medium<D> + Send + 'static>(self, site: &Site<D>, medium: M) -> Result<Outcome, RunError> {
-        go(site, medium, self.settings, self.control, self.sink)
+    fn go<M: Medium<D> + Send + 'static>(self, site: &Site<D>, media: Media<M>) -> Result<Outcome, RunError> {
+        go(site, media, self.settings, self.control, self.sink)
     }
 }
 
@@ -54,27 +61,33 @@ pub fn run<const D: usize>(
     in_medium(&site, Masses { settings, control, sink })
 }
 
-/// The flow of a plan, if it has to be solved or read.
-pub fn flow_of(plan: &Plan, settings: &Settings) -> Result<Option<Arc<FaceFlow>>, RunError> {
-    if let Some(flow) = &settings.flow {
-        return Ok(Some(flow.clone()));
+/// The flows of a plan, if they have to be solved or read.
+pub fn flow_of(plan: &Plan, settings: &Settings) -> Result<Option<FlowSeries>, RunError> {
+    match &settings.flow {
+        Some(flow) => Ok(Some(flow.clone())),
+        None => build::series(plan).map_err(|error| RunError::Flow(error.to_string())),
     }
-    let solution = build::of(plan).map_err(|error| RunError::Flow(error.to_string()))?;
-    Ok(solution.map(|solution| Arc::new(solution.flow)))
 }
 
-/// Does something in the medium of a plan, which is matched here, once.
+/// Does something in the media of a plan, which are matched here, once.
 pub fn in_medium<const D: usize, W: InMedium<D>>(site: &Site<D>, what: W) -> Result<W::Output, RunError> {
     let plan = site.plan;
     match (&site.transport.flow, &site.transport.dispersion) {
-        (Flow::Uniform(velocity), Dispersion::Constant(_) | Dispersion::Velocity { .. })
+        (Flow::Uniform(first), Dispersion::Constant(_) | Dispersion::Velocity { .. })
             if is_constant(&site.transport.porosity) =>
         {
-            let velocity: [f64; D] =
-                velocity.clone().try_into().map_err(|_| unsound("a velocity that does not fit the axes"))?;
-            what.go(site, uniform(plan, velocity, &site.transport.dispersion)?)
+            let medium = |period: usize| {
+                let velocity = match changed(site, period) {
+                    Some(Changed::Uniform(velocity)) => velocity.clone(),
+                    _ => first.clone(),
+                };
+                let velocity =
+                    velocity.try_into().map_err(|_| unsound("a velocity that does not fit the axes"))?;
+                uniform(plan, velocity, &site.transport.dispersion)
+            };
+            what.go(site, &medium)
         }
-        (Flow::Uniform(_) | Flow::Expression(_), _) => what.go(site, formula(site)?),
+        (Flow::Uniform(_) | Flow::Expression(_), _) => what.go(site, &|period| formula(site, period)),
         (
             Flow::Darcy(_) | Flow::File(_),
             Dispersion::Velocity { longitudinal, transverse, transverse_vertical, molecular },
@@ -95,10 +108,12 @@ pub fn in_medium<const D: usize, W: InMedium<D>>(site: &Site<D>, what: W) -> Res
         }
         (Flow::Darcy(_) | Flow::File(_), Dispersion::Constant(_) | Dispersion::Isotropic(_)) => {
             let none = Lengths { longitudinal: 0.0, transverse: 0.0, vertical: None, molecular: 0.0 };
-            let flow = site.flow.as_ref().ok_or_else(|| unsound("a flow that nobody solved"))?;
             let axes = std::array::from_fn(|axis| plan.axes[axis].index);
-            let cells = UnevenMedium::<D>::new(flow, axes, none);
-            what.go(site, Blend { cells, spreading: formula(site)? })
+            let medium = |period: usize| {
+                let cells = UnevenMedium::<D>::new(solved(site, period)?, axes, none);
+                Ok(Blend { cells, spreading: formula(site, period)? })
+            };
+            what.go(site, &medium)
         }
     }
 }
@@ -109,25 +124,40 @@ fn on_cells<const D: usize, W: InMedium<D>>(
     lengths: Lengths,
     what: W,
 ) -> Result<W::Output, RunError> {
-    let flow = site.flow.as_ref().ok_or_else(|| unsound("a flow that nobody solved"))?;
     let axes = std::array::from_fn(|axis| site.plan.axes[axis].index);
     let Lengths { longitudinal, transverse, vertical, molecular } = lengths;
     let is_still = [longitudinal, transverse, vertical.unwrap_or(0.0)].iter().all(|length| *length == 0.0);
     let follows_paths = |carrier: Carrier| carrier.molecular.unwrap_or(molecular) == 0.0;
     // Parcels of water, which are no carriers, touch walls on their way and walk in steps.
     if is_still && site.carriers().into_iter().any(follows_paths) {
-        let paths = Paths::new(flow, axes, &site.drains());
-        let medium = UnevenMedium::<D>::new(flow, axes, lengths);
-        return what.go(site, Pathed { medium, paths, molecular });
+        let pathed = |period: usize| {
+            let flow = solved(site, period)?;
+            let paths = Paths::new(flow, axes, &site.drains(period));
+            let medium = UnevenMedium::<D>::new(flow, axes, lengths);
+            Ok(Pathed { medium, paths, molecular })
+        };
+        return what.go(site, &pathed);
     }
-    let even = match vertical {
-        None => CellMedium::<D>::new(flow, axes, Dispersivity { longitudinal, transverse, molecular }),
-        Some(_) => None,
+    let even = |period: usize| {
+        let flow = solved(site, period)?;
+        Ok(CellMedium::<D>::new(flow, axes, Dispersivity { longitudinal, transverse, molecular }))
     };
-    match even {
-        Some(medium) => what.go(site, medium),
-        None => what.go(site, UnevenMedium::<D>::new(flow, axes, lengths)),
+    // All flows have the same cells and porosity.
+    if vertical.is_none() && even(0)?.is_some() {
+        return what.go(site, &|period| even(period)?.ok_or_else(|| unsound("cells that are not equal")));
     }
+    what.go(site, &|period| Ok(UnevenMedium::<D>::new(solved(site, period)?, axes, lengths)))
+}
+
+/// The flow on cells of a period.
+fn solved<'a, const D: usize>(site: &'a Site<D>, period: usize) -> Result<&'a FaceFlow, RunError> {
+    site.face_flow(period).ok_or_else(|| unsound("a flow that nobody solved"))
+}
+
+/// What the flow has become in a period after the first.
+fn changed<'a, const D: usize>(site: &Site<'a, D>, period: usize) -> Option<&'a Changed> {
+    let change = site.transport.changes.get(period.checked_sub(1)?)?;
+    Some(&change.flow)
 }
 
 fn is_constant(tape: &Tape) -> bool {
@@ -135,13 +165,14 @@ fn is_constant(tape: &Tape) -> bool {
 }
 
 /// A medium of expressions.
-fn formula<const D: usize>(site: &Site<D>) -> Result<Formula<D>, RunError> {
+fn formula<const D: usize>(site: &Site<D>, period: usize) -> Result<Formula<D>, RunError> {
     let constant = |value: f64| Tape { operations: vec![Operation::Constant(value)] };
-    let velocity: Vec<Tape> = match &site.transport.flow {
-        Flow::Uniform(velocity) => velocity.iter().map(|&v| constant(v)).collect(),
-        Flow::Expression(tapes) => tapes.clone(),
+    let uniform = |velocity: &[f64]| velocity.iter().map(|&v| constant(v)).collect();
+    let velocity: Vec<Tape> = match (changed(site, period), &site.transport.flow) {
+        (Some(Changed::Uniform(velocity)), _) | (None, Flow::Uniform(velocity)) => uniform(velocity),
+        (Some(Changed::Expression(tapes)), _) | (None, Flow::Expression(tapes)) => tapes.clone(),
         // Cells have the velocity, and the porosity.
-        Flow::Darcy(_) | Flow::File(_) => vec![constant(0.0); D],
+        _ => vec![constant(0.0); D],
     };
     let spreading = match &site.transport.dispersion {
         Dispersion::Constant(triangle) => Spreading::Constant(triangle_of(triangle)?, 0.0),

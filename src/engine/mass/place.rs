@@ -5,6 +5,7 @@
 
 use super::spots::Spots;
 use crate::maths::scalar::{cos, ln, sin};
+use std::sync::Arc;
 
 /// Mass spread over places.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,7 +57,7 @@ pub struct Cells<const D: usize> {
 /// Rectangles of one side with a weight each.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Faces<const D: usize> {
-    corners: Vec<([f64; D], [f64; D])>,
+    corners: Arc<[([f64; D], [f64; D])]>,
     cumulative: Vec<f64>,
 }
 
@@ -153,8 +154,29 @@ impl<const D: usize> Faces<D> {
         Self { corners: faces.into_iter().map(|(low, high, _)| (low, high)).collect(), cumulative }
     }
 
+    /// The same rectangles with other weights, one list after another.
+    pub fn in_time(corners: &[([f64; D], [f64; D])], weights: &[Vec<f64>]) -> Vec<Self> {
+        let corners: Arc<[([f64; D], [f64; D])]> = corners.into();
+        let running = |weights: &Vec<f64>| {
+            let mut sum = 0.0;
+            let mut next = |weight: f64| {
+                sum += weight;
+                sum
+            };
+            weights.iter().map(|&weight| next(weight)).collect()
+        };
+        weights.iter().map(|own| Self { corners: corners.clone(), cumulative: running(own) }).collect()
+    }
+
     pub fn total(&self) -> f64 {
         self.cumulative.last().copied().unwrap_or(0.0)
+    }
+
+    /// A place by the weights.
+    pub fn at(&self, uniforms: &[f64; 8]) -> [f64; D] {
+        let (face, _) = find(&self.cumulative, uniforms[3] * self.total());
+        let (low, high) = &self.corners[face];
+        std::array::from_fn(|axis| low[axis] + uniforms[axis] * (high[axis] - low[axis]))
     }
 }
 
@@ -173,11 +195,7 @@ impl<const D: usize> Place<D> {
                 std::array::from_fn(|axis| tails[axis].folded(centre[axis] + deviation[axis] * normals[axis]))
             }
             Self::Cells(cells) => cells.at(share, uniforms),
-            Self::Faces(faces) => {
-                let (face, _) = find(&faces.cumulative, uniforms[3] * faces.total());
-                let (low, high) = &faces.corners[face];
-                between(low, high)
-            }
+            Self::Faces(faces) => faces.at(uniforms),
             Self::Spots(spots) => spots.at(share),
         }
     }

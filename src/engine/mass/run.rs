@@ -7,7 +7,7 @@ use super::super::clock::Clock;
 use super::super::control::{Control, Settings};
 use super::super::error::RunError;
 use super::super::parallel::Pool;
-use super::super::schedule::{Due, schedule, step_length};
+use super::super::schedule::{Due, schedule};
 use super::super::snapshot::{Outcome, Snapshot};
 use super::super::track::fates::Chain;
 use super::super::track::medium::{Carrier, Medium};
@@ -17,8 +17,10 @@ use super::super::track::walls::Ends;
 use super::book::{Book, Event};
 use super::flock::{self, Flock};
 use super::gate::{Gates, Monitors};
+use super::media::Media;
 use super::observe::Scene;
 use super::order::Order;
+use super::parts::Drafts;
 use super::release::{Birth, Kind, Release, Window};
 use super::units::Units;
 use super::world::Site;
@@ -26,7 +28,7 @@ use crate::chemistry::Work;
 use crate::flow::statistics::Statistics;
 use crate::maths::exact::{MOST_TERMS, Quanta};
 use crate::maths::wide::Width;
-use crate::plan::{Normals, Station};
+use crate::plan::Normals;
 use crate::state::stream::{Purpose, Stream};
 
 /// Steps that a block is taken through before the next one.
@@ -55,26 +57,30 @@ pub struct Run<'a, const D: usize, M: Medium<D>> {
     pub displacements: u64,
     /// Absent where it does not matter how particles lie in memory.
     order: Option<Order<D>>,
+    /// The number of the flow.
+    pub period: usize,
 }
 
-/// Runs in a medium.
+/// Runs in the medium of each period.
 pub fn go<const D: usize, M: Medium<D>>(
     site: &Site<D>,
-    medium: M,
+    media: Media<M>,
     settings: &Settings,
     control: &dyn Control,
     sink: Sink,
 ) -> Result<Outcome, RunError> {
     let mut clock = Clock::start();
-    let mut dues = schedule(site.plan)?;
+    let calendar = &site.calendar;
+    let mut dues = schedule(site.plan, calendar)?;
     let width = if settings.is_narrow { Width::baseline() } else { Width::widest() };
-    let mut run = Run::new(site, medium, width, &mut dues)?;
+    let mut run = Run::new(site, media, width, &mut dues)?;
     let mut loop_clock = Clock::start();
     let mut dues = dues.iter().peekable();
-    let n_steps = site.plan.time.n_steps;
+    let n_steps = calendar.n_steps();
     let mut step = 0;
     run.start()?;
     loop {
+        run.enter(step, media)?;
         let mut snapshots = run.gates.ready(step);
         while let Some(due) = dues.next_if(|due| due.steps == step) {
             snapshots.extend(run.observe(due)?);
@@ -90,9 +96,7 @@ pub fn go<const D: usize, M: Medium<D>>(
             break;
         }
         let next_due = dues.peek().map_or(n_steps, |due| due.steps.max(step + 1));
-        let end = next_due.min(step + run.tile_length()).min(n_steps);
-        // The last step may have another length.
-        let end = if end == n_steps && step + 1 < n_steps { n_steps - 1 } else { end };
+        let end = calendar.even_until(step, next_due.min(step + run.tile_length()));
         run.tile(step, end)?;
         step = end;
         control.step_done(step, n_steps);
@@ -113,20 +117,32 @@ pub fn go<const D: usize, M: Medium<D>>(
 }
 
 impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
-    fn new(site: &'a Site<'a, D>, medium: M, width: Width, dues: &mut Vec<Due>) -> Result<Self, RunError> {
-        let mut tracker = site.tracker(medium, width)?;
+    fn new(
+        site: &'a Site<'a, D>,
+        media: Media<M>,
+        width: Width,
+        dues: &mut Vec<Due>,
+    ) -> Result<Self, RunError> {
+        let mut tracker = site.tracker(media(0)?, width)?;
         let period = |axis: usize| match tracker.ends[axis] {
             Ends::Periodic { low, high } => Some((low, high)),
             Ends::Walls(_) => None,
         };
         let periods = std::array::from_fn(period);
         let mut monitors = Monitors { planes: Vec::new(), gaps: Vec::new(), periods };
-        let water = |station: &Station| site.water(&tracker.medium, station);
-        let gates = Gates::new(site.plan, dues, &mut monitors, water);
+        let mut gates = Gates::new(site.plan, &site.calendar, dues, &mut monitors);
         (tracker.planes, tracker.gaps) = (monitors.planes, monitors.gaps);
+        let mut drafts = Drafts::new(site)?;
+        for (number, &from) in site.starts.iter().enumerate() {
+            // One medium at a time: they may be large.
+            let later = if number == 0 { None } else { Some(media(number)?) };
+            let medium = later.as_ref().unwrap_or(&tracker.medium);
+            gates.look(from, |station| site.water(medium, station, number));
+            drafts.look(site, medium);
+        }
         let chain =
             site.transport.decay.as_ref().map(|decay| Chain::new(decay, &site.carriers(), site.plan.seed));
-        let releases = site.releases(&tracker)?;
+        let releases = drafts.releases(site)?;
         let n_populations = site.transport.populations.len();
         let units = Units::new(&releases, n_populations, site.transport.decay.as_ref());
         let doors = releases.iter().map(|release| release.door).collect();
@@ -148,6 +164,7 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
             benches: Pool::new(),
             displacements: 0,
             order: Order::new(site),
+            period: 0,
             site,
             tracker,
             paces: chain.as_ref().map_or_else(Vec::new, |chain| chain.carriers(&site.carriers())),
@@ -155,6 +172,19 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
             releases,
             units,
         })
+    }
+
+    /// Takes on the flow of a step.
+    fn enter(&mut self, step: u64, media: Media<M>) -> Result<(), RunError> {
+        let period = self.site.period(step.min(self.site.calendar.n_steps().saturating_sub(1)));
+        if period != self.period {
+            self.period = period;
+            self.tracker.medium = media(period)?;
+            self.tracker.drains = self.site.drains(period);
+            // What is kept for a thread is of the medium before.
+            self.benches = Pool::new();
+        }
+        Ok(())
     }
 
     pub fn note(&mut self, events: &[Event]) {
@@ -180,21 +210,22 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
 
     /// Takes everything through steps of equal length.
     fn tile(&mut self, first: u64, end: u64) -> Result<(), RunError> {
-        let time = &self.site.plan.time;
+        let calendar = &self.site.calendar;
         let before = self.displacements;
-        self.advance(Steps { first, end, t: first as f64 * time.step, dt: step_length(time, first) })?;
+        self.advance(Steps { first, end, t: calendar.start(first), dt: calendar.length(first) }, 1.0)?;
         if let Some(order) = &mut self.order {
             order.moved(self.displacements - before, &mut self.flocks);
         }
         Ok(())
     }
 
-    fn advance(&mut self, steps: Steps) -> Result<(), RunError> {
+    /// Takes everything through steps, or through a part of one.
+    fn advance(&mut self, steps: Steps, part: f64) -> Result<(), RunError> {
         let Steps { first, end, t, dt } = steps;
         self.empty_boxes(t);
         let mut newborn: Vec<Vec<Birth<D>>> = Vec::new();
         for step in first..end {
-            let window = Window { step, t: t + (step - first) as f64 * dt, dt };
+            let window = Window { step, t: t + (step - first) as f64 * dt, dt, period: self.period, part };
             let mut births = Vec::new();
             for release in &self.releases {
                 if !matches!(release.kind, Kind::Steady { from: 0.0, to: 0.0, .. }) {
@@ -247,10 +278,10 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
         let steps = Steps {
             first: due.steps,
             end: due.steps + 1,
-            t: due.steps as f64 * plan.time.step,
-            dt: due.fraction * step_length(&plan.time, due.steps),
+            t: self.site.calendar.start(due.steps),
+            dt: due.fraction * self.site.calendar.length(due.steps),
         };
-        let found = self.advance(steps).and_then(|()| self.look(due));
+        let found = self.advance(steps, due.fraction).and_then(|()| self.look(due));
         (self.flocks, self.book, self.displacements) = (flocks, book, displacements);
         (self.tracker.draws, self.tracker.planes, self.tracker.gaps) = (draws, planes, gaps);
         self.gates = gates;

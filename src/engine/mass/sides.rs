@@ -33,10 +33,11 @@ impl<const D: usize> Site<'_, D> {
 
 fn law(rule: &SideRule) -> Law {
     match rule {
-        SideRule::Reflect | SideRule::Periodic | SideRule::Open | SideRule::Inflow(_) => Law::Reflect,
+        SideRule::Reflect | SideRule::Periodic | SideRule::Open => Law::Reflect,
         SideRule::Absorb | SideRule::Held(_) => Law::Absorb,
         SideRule::Partial(rate) => Law::Partial(*rate),
-        SideRule::Outflow => Law::Outflow,
+        // Where and while the water leaves, what it carries leaves with it.
+        SideRule::Inflow(_) | SideRule::Outflow => Law::Outflow,
     }
 }
 

@@ -11,24 +11,26 @@ use crate::plan::Station;
 const POINTS: usize = 64;
 
 impl<const D: usize> Site<'_, D> {
-    /// Water through a station in the direction that counts, m³/s (m², m with fewer axes).
-    pub fn water<M: Medium<D>>(&self, medium: &M, station: &Station) -> f64 {
+    /// Water through a station in the direction that counts during a flow, m³/s (m², m with fewer axes).
+    pub fn water<M: Medium<D>>(&self, medium: &M, station: &Station, period: usize) -> f64 {
         match station {
             Station::Part { of, low, high } => {
                 let array = |list: &[f64]| std::array::from_fn(|axis| list[axis]);
-                self.water_within(medium, of, [array(low), array(high)])
+                self.water_within(medium, of, [array(low), array(high)], period)
             }
-            Station::Well(name) => self.taken_out(name),
+            Station::Well(name) => self.taken_out(name, period),
             Station::Plane { .. } | Station::Side(_) => {
-                self.water_within(medium, station, [self.low, self.high])
+                self.water_within(medium, station, [self.low, self.high], period)
             }
             Station::Box { .. } => f64::NAN,
         }
     }
 
     /// Water that a well takes out of all its cells.
-    fn taken_out(&self, name: &str) -> f64 {
-        let (Some((_, outlet)), Some(flow)) = (self.plan.outlet(name), &self.flow) else { return f64::NAN };
+    fn taken_out(&self, name: &str, period: usize) -> f64 {
+        let (Some((_, outlet)), Some(flow)) = (self.plan.outlet(name), self.face_flow(period)) else {
+            return f64::NAN;
+        };
         let own = flow.sinks.iter().filter(|sink| sink.owner == outlet.owner && sink.rate > 0.0);
         own.map(|sink| sink.rate).sum()
     }
@@ -38,6 +40,7 @@ impl<const D: usize> Site<'_, D> {
         medium: &M,
         station: &Station,
         within @ [low, high]: [[f64; D]; 2],
+        period: usize,
     ) -> f64 {
         let (axis, at, sign) = match *station {
             Station::Plane { axis, at } => (axis, at, 1.0),
@@ -45,7 +48,9 @@ impl<const D: usize> Site<'_, D> {
             Station::Side(side) => (side / 2, self.high[side / 2], 1.0),
             _ => return f64::NAN,
         };
-        let Some(flow) = &self.flow else { return sign * self.by_points(medium, axis, at, within) };
+        let Some(flow) = self.face_flow(period) else {
+            return sign * self.by_points(medium, axis, at, within);
+        };
         let mut limits = [[f64::NEG_INFINITY; 3], [f64::INFINITY; 3]];
         for (axis, of) in self.plan.axes.iter().enumerate() {
             (limits[0][of.index], limits[1][of.index]) = (low[axis], high[axis]);

@@ -6,7 +6,7 @@
 use super::super::error::RunError;
 use super::super::mass::book::What;
 use super::super::mass::gate::{Gates, Monitors};
-use super::super::mass::media::InMedium;
+use super::super::mass::media::{InMedium, Media};
 use super::super::mass::world::Site;
 use super::super::parallel::Pool;
 use super::super::schedule::Due;
@@ -75,16 +75,20 @@ pub struct Launch<'a> {
 impl<const D: usize> InMedium<D> for Launch<'_> {
     type Output = Launched<D>;
 
-    fn go<M: Medium<D> + Send + 'static>(self, site: &Site<D>, medium: M) -> Result<Self::Output, RunError> {
-        let mut tracker = site.tracker(medium, self.width)?;
+    fn go<M: Medium<D> + Send + 'static>(
+        self,
+        site: &Site<D>,
+        media: Media<M>,
+    ) -> Result<Self::Output, RunError> {
+        let mut tracker = site.tracker(media(0)?, self.width)?;
         let period = |axis: usize| match tracker.ends[axis] {
             Ends::Periodic { low, high } => Some((low, high)),
             Ends::Walls(_) => None,
         };
         let periods = std::array::from_fn(period);
         let mut monitors = Monitors { planes: Vec::new(), gaps: Vec::new(), periods };
-        let water = |station: &Station| site.water(&tracker.medium, station);
-        let gates = Gates::new(site.plan, self.dues, &mut monitors, water);
+        let mut gates = Gates::new(site.plan, &site.calendar, self.dues, &mut monitors);
+        gates.look(0.0, |station| site.water(&tracker.medium, station, 0));
         (tracker.planes, tracker.gaps) = (monitors.planes, monitors.gaps);
         let is_watched = |side: &usize| {
             site.plan.outputs.iter().any(|output| output.station == Some(Station::Side(*side)))

@@ -105,7 +105,7 @@ fn discharge<const D: usize, M: Medium<D>>(
 
 /// The cells that wells put water into.
 fn injections<const D: usize>(site: &Site<D>) -> Vec<Gush<D>> {
-    let Some(flow) = &site.flow else { return Vec::new() };
+    let Some(flow) = site.face_flow(0) else { return Vec::new() };
     let gush = |sink: &crate::flow::Sink| {
         let [low, high] = site.cell(flow, sink.cell);
         (low, high, -sink.rate)

@@ -151,7 +151,7 @@ impl<const D: usize> Water<D> {
         steps: Steps,
         passages: &mut Passages<D>,
     ) -> Result<Vec<(Block<D>, Vec<f64>)>, RunError> {
-        let window = Window { step: steps.first, t: steps.t, dt: steps.dt };
+        let window = Window { step: steps.first, t: steps.t, dt: steps.dt, period: 0, part: 1.0 };
         let mut list: Vec<(Block<D>, Vec<f64>)> = Vec::new();
         for inlet in self.inlets.iter() {
             let mut births: Vec<Birth<D>> = Vec::new();

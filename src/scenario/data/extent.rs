@@ -66,7 +66,7 @@ fn everywhere(scenario: &Scenario) -> Vec<&Expr> {
     }));
     list.extend(scenario.medium.iter().map(|medium| &medium.value));
     match scenario.flow.as_ref().map(|flow| &flow.value) {
-        Some(Flow::Expression(exprs)) => list.extend(exprs),
+        Some(Flow::Expression(exprs, _)) => list.extend(exprs),
         Some(Flow::Darcy(darcy)) => {
             if let Conductivity::Expression(expr) = &darcy.conductivity {
                 list.push(expr);

@@ -4,7 +4,7 @@
 //! deliberately cuts nothing into particles.
 
 use super::super::check::Checker;
-use super::super::expression::Type;
+use super::super::expression::{Expr, Type};
 use super::super::model::species_index;
 use super::source::{dimensions, report_dimension};
 use super::{Region, Strength};
@@ -74,7 +74,10 @@ pub(super) fn rows<'a>(
     let parts = columns.numbers[..n_axes].iter().chain([&columns.numbers[value]]).cloned().collect();
     let cloud = Cloud::new(parts).ok()?;
     let total = cloud.cumulative().last().copied().unwrap_or(0.0);
-    let strength = if found == 1 { Strength::Rate(total) } else { Strength::Pulse(total) };
+    let strength = match found {
+        1 => Strength::Rate(Expr::constant(total, kind, assignment.value.span)),
+        _ => Strength::Pulse(total),
+    };
     Some(((species, strength), Region::Table(Arc::new(cloud))))
 }
 

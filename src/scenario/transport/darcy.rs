@@ -4,9 +4,11 @@
 //! solves nothing.
 
 use super::super::check::{Allow, Checker};
+use super::super::expression::Expr;
 use super::super::geometry::grid;
+use super::change::changes;
 use super::lognormal;
-use super::sides::{side_names, side_words};
+use super::sides::{concentrations, side_names, side_words};
 use super::{Conductivity, Darcy, DarcySide, Well};
 use crate::diagnostic::codes::{D002, D009, M001, M002, M028, M030};
 use crate::diagnostic::{Diagnostic, precise};
@@ -23,6 +25,7 @@ struct Found<'a> {
     anisotropy: Option<(Span, &'a tree::Expr)>,
     grid: Option<(Span, &'a [tree::Expr])>,
     wells: Vec<&'a tree::Well>,
+    change: Option<(Span, &'a tree::Change)>,
     is_right: bool,
 }
 
@@ -54,33 +57,35 @@ pub fn darcy<'a>(
     let cells = found.grid.and_then(|(span, counts)| grid(checker, counts, "the cells of the flow", span));
     let anisotropy = anisotropy(checker, found.anisotropy);
     let wells = wells(checker, &found.wells);
+    let changes = changes(checker, found.change.map(|(_, change)| change));
     let (conductivity, cells, anisotropy, wells) = (conductivity?, cells?, anisotropy?, wells?);
+    let changes = changes?;
     is_right.then_some(())?;
     let sides: Vec<[DarcySide; 2]> = found
         .sides
         .iter()
-        .map(|[low, high]| Some([low.as_ref()?.0, high.as_ref()?.0]))
+        .map(|[low, high]| Some([low.as_ref()?.0.clone(), high.as_ref()?.0.clone()]))
         .collect::<Option<_>>()?;
     let Spanned { value: cells, span: cells_span } = cells;
     let conductivity_span = found.conductivity.map_or(place, |(_, written)| written.span);
-    Some(Darcy { cells, cells_span, sides, conductivity, conductivity_span, anisotropy, wells })
+    Some(Darcy { cells, cells_span, sides, conductivity, conductivity_span, anisotropy, wells, changes })
 }
 
 fn gather<'a>(checker: &mut Checker<'a>, entries: &'a [DarcyEntry]) -> Found<'a> {
     let mut found =
-        Found { sides: vec![[None, None]; checker.axes.len()], is_right: true, ..Found::default() };
+        Found { sides: vec![[const { None }; 2]; checker.axes.len()], is_right: true, ..Found::default() };
     for entry in entries {
         match &entry.kind {
             DarcyKind::Head(list) => {
                 for (side, value) in list {
-                    let head = checker.slot(value, "the head", Dimension::LENGTH);
-                    set_side(checker, &mut found, side, head.map(|head| DarcySide::Head(head.value)));
+                    let head = timed(checker, value, "the head", Dimension::LENGTH);
+                    set_side(checker, &mut found, side, head.map(DarcySide::Head));
                 }
             }
             DarcyKind::Flux(list) => {
                 for (side, value) in list {
-                    let flux = checker.slot(value, "the flux", Dimension::VELOCITY);
-                    set_side(checker, &mut found, side, flux.map(|flux| DarcySide::Flux(flux.value)));
+                    let flux = timed(checker, value, "the flux", Dimension::VELOCITY);
+                    set_side(checker, &mut found, side, flux.map(DarcySide::Flux));
                 }
             }
             DarcyKind::NoFlow(list) => {
@@ -102,6 +107,10 @@ fn gather<'a>(checker: &mut Checker<'a>, entries: &'a [DarcyEntry]) -> Found<'a>
                 twice(checker, &mut found, "grid", entry.word, first.map(|it| it.0));
             }
             DarcyKind::Well(well) => found.wells.push(well),
+            DarcyKind::Change(change) => {
+                let first = found.change.replace((entry.word, change));
+                twice(checker, &mut found, "change", entry.word, first.map(|it| it.0));
+            }
         }
     }
     found
@@ -125,7 +134,7 @@ fn set_side(checker: &mut Checker<'_>, found: &mut Found<'_>, side: &tree::Name,
         found.is_right = false;
         return;
     };
-    if let Some((_, first)) = found.sides[axis][end] {
+    if let Some((_, first)) = found.sides[axis][end].clone() {
         checker.report(
             Diagnostic::error(M002, format!("side `{}` of the flow is given twice", side.value))
                 .at(side.span, "here again")
@@ -147,11 +156,11 @@ fn check_sides(checker: &mut Checker<'_>, found: &Found<'_>, place: Span) -> boo
     for (axis, ends) in found.sides.iter().enumerate() {
         let names = side_names(indices[axis], &indices)[0];
         missing.extend((0..2).filter(|&end| ends[end].is_none()).map(|end| names[end]));
-        if let [Some((low, low_span)), Some((high, high_span))] = *ends
-            && (low == DarcySide::Periodic) != (high == DarcySide::Periodic)
+        if let [Some((low, low_span)), Some((high, high_span))] = ends
+            && (*low == DarcySide::Periodic) != (*high == DarcySide::Periodic)
         {
             let (at, other) =
-                if low == DarcySide::Periodic { (low_span, high_span) } else { (high_span, low_span) };
+                if *low == DarcySide::Periodic { (*low_span, *high_span) } else { (*high_span, *low_span) };
             checker.report(
                 Diagnostic::error(
                     M030,
@@ -254,7 +263,7 @@ fn read_well<'a>(checker: &mut Checker<'a>, well: &'a tree::Well) -> Option<Well
     let n_axes = checker.axes.len();
     let area = Dimension::LENGTH.power(n_axes as i32, 1)?;
     let rate = match &well.rate {
-        Some(rate) => checker.slot(rate, "the rate of a well", area.over(Dimension::TIME)),
+        Some(rate) => timed(checker, rate, "the rate of a well", area.over(Dimension::TIME)),
         None => {
             checker.report(
                 Diagnostic::error(M001, format!("well `{}` has no rate", well.name.value))
@@ -265,9 +274,22 @@ fn read_well<'a>(checker: &mut Checker<'a>, well: &'a tree::Well) -> Option<Well
             None
         }
     };
+    let carrying = concentrations(checker, &well.carrying, Allow::TIME);
     let (low, high) = well_place(checker, well)?;
     checker.is_inside(&[low, high], &format!("well `{}`", well.name.value), well.at.span, M028)?;
-    Some(Well { name: well.name.value.clone(), low, high, rate: rate?.value })
+    Some(Well { name: well.name.value.clone(), low, high, rate: rate?, carrying: carrying? })
+}
+
+/// A value that may change in time.
+fn timed<'a>(
+    checker: &mut Checker<'a>,
+    written: &'a tree::Expr,
+    what: &str,
+    dimension: Dimension,
+) -> Option<Expr> {
+    let value = checker.check(written, Allow::TIME)?;
+    checker.expect_dimension(written, &value, what, &[dimension])?;
+    Some(value)
 }
 
 /// Its point, or the ends of its screen along the last axis.

@@ -8,6 +8,7 @@ use super::super::collect::Statements;
 use super::super::expression::Expr;
 use super::super::slot::tuple_parts;
 use super::Flow;
+use super::change::changes;
 use super::file::FileKind;
 use crate::diagnostic::codes::{D009, M001, M002, M004};
 use crate::diagnostic::{Diagnostic, precise};
@@ -38,10 +39,12 @@ pub fn flow<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> Optio
     let kind = checker.word(&statement.kind, "a kind of flow", KINDS)?;
     let flow = match (kind, &statement.argument) {
         (Kind::Uniform, FlowArgument::Value(value)) => {
-            Flow::Uniform(checker.vector(value, "the velocity", Dimension::VELOCITY)?)
+            velocity(checker, value, Allow::TIME, statement.change.as_ref())?
         }
-        (Kind::Velocity, FlowArgument::Assigned(value)) => velocity(checker, value)?,
-        (Kind::Darcy, FlowArgument::Entries(entries)) => {
+        (Kind::Velocity, FlowArgument::Assigned(value)) => {
+            velocity(checker, value, Allow::REFERENCE, statement.change.as_ref())?
+        }
+        (Kind::Darcy, FlowArgument::Entries(entries)) if statement.change.is_none() => {
             Flow::Darcy(Box::new(super::darcy::darcy(checker, statement, entries)?))
         }
         (Kind::File(kind), FlowArgument::Files(names, entries)) => {
@@ -94,10 +97,20 @@ fn report_argument(checker: &mut Checker<'_>, kind: Kind, statement: &tree::Flow
     );
 }
 
-/// An expression of the place for each axis; constants make it uniform.
-fn velocity<'a>(checker: &mut Checker<'a>, written: &'a tree::Expr) -> Option<Flow> {
+/// An expression for each axis; constants make it uniform.
+fn velocity<'a>(
+    checker: &mut Checker<'a>,
+    written: &'a tree::Expr,
+    allow: Allow,
+    change: Option<&'a tree::Change>,
+) -> Option<Flow> {
+    let changes = changes(checker, change);
     let parts = tuple_parts(written);
     let indices: Vec<usize> = checker.axes.iter().map(|(_, index)| *index).collect();
+    if parts.len() != indices.len() && !allow.position {
+        checker.vector(written, "the velocity", Dimension::VELOCITY);
+        return None;
+    }
     if parts.len() != indices.len() {
         checker.report(
             Diagnostic::error(D009, "the velocity needs one expression for each axis of the domain")
@@ -113,7 +126,7 @@ fn velocity<'a>(checker: &mut Checker<'a>, written: &'a tree::Expr) -> Option<Fl
     }
     let mut list: Vec<Option<Expr>> = Vec::new();
     for part in parts {
-        let value = checker.check(part, Allow::PLACE);
+        let value = checker.check(part, allow);
         let is_right = value
             .as_ref()
             .and_then(|value| checker.expect_dimension(part, value, "the velocity", &[Dimension::VELOCITY]));
@@ -127,7 +140,7 @@ fn velocity<'a>(checker: &mut Checker<'a>, written: &'a tree::Expr) -> Option<Fl
             indices.iter().zip(values).for_each(|(&index, value)| velocity[index] = value);
             Flow::Uniform(velocity)
         }
-        None => Flow::Expression(list),
+        None => Flow::Expression(list, changes?),
     })
 }
 

@@ -3,6 +3,7 @@
 //! Owns the types, and in the files beside it the checks. May use the scenario's slots and expressions. It
 //! deliberately solves and samples nothing: `plan` and `flow` do.
 
+pub(super) mod change;
 mod cloud;
 pub(super) mod darcy;
 pub(super) mod dispersion;
@@ -29,8 +30,8 @@ use std::sync::Arc;
 pub enum Flow {
     /// m/s along x, y, z
     Uniform([f64; 3]),
-    /// m/s, an expression of the place for each axis of the domain.
-    Expression(Vec<Expr>),
+    /// m/s, an expression of place and time for each axis of the domain.
+    Expression(Vec<Expr>, Changes),
     Darcy(Box<Darcy>),
     File(Box<FileFlow>),
 }
@@ -48,16 +49,38 @@ pub struct Darcy {
     /// Along each axis of the domain over that along the first.
     pub anisotropy: Vec<f64>,
     pub wells: Vec<Well>,
+    pub changes: Changes,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Times at which a flow that changes is taken anew, beside those at which its expressions switch.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Changes {
+    /// s
+    pub at: Vec<f64>,
+    pub every: Option<f64>,
+    /// The word; absent if the scene does not say.
+    pub span: Option<Span>,
+}
+
+/// What the water does at a side; expressions are of the time.
+#[derive(Debug, Clone, PartialEq)]
 pub enum DarcySide {
     /// m
-    Head(f64),
+    Head(Expr),
     /// Specific discharge into the domain, m/s.
-    Flux(f64),
+    Flux(Expr),
     NoFlow,
     Periodic,
+}
+
+impl DarcySide {
+    /// The head or the flux.
+    pub fn value(&self) -> Option<&Expr> {
+        match self {
+            Self::Head(value) | Self::Flux(value) => Some(value),
+            Self::NoFlow | Self::Periodic => None,
+        }
+    }
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -82,8 +105,10 @@ pub struct Well {
     pub name: String,
     pub low: [f64; 3],
     pub high: [f64; 3],
-    /// Water put in, m³/s, per m² or m with fewer axes.
-    pub rate: f64,
+    /// Water put in, m³/s, per m² or m with fewer axes, over time.
+    pub rate: Expr,
+    /// Concentrations in that water, over time; 0 for all other species.
+    pub carrying: Vec<(usize, Expr)>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -147,14 +172,14 @@ pub enum Region {
     Table(Arc<Cloud>),
 }
 
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Strength {
     /// mol or kg, per m² or m with fewer axes.
     Pulse(f64),
-    /// The same per s.
-    Rate(f64),
-    /// mol/m³ or kg/m³
-    Held(f64),
+    /// The same per s, over time.
+    Rate(Expr),
+    /// mol/m³ or kg/m³, over time.
+    Held(Expr),
 }
 
 /// How particles that carry mass are shared among species.

@@ -5,7 +5,7 @@
 use super::super::check::Checker;
 use super::super::expression::Expr;
 use super::super::{OutputKind, Rate, Scenario};
-use super::{Dispersion, Flow, Patch, SideRule};
+use super::{DarcySide, Dispersion, Flow, Patch, SideRule};
 use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{M025, M026, M032};
 use crate::source::Span;
@@ -64,6 +64,25 @@ fn moving_walls(scenario: &Scenario) -> Option<Span> {
     (has_walls || !is_uniform || !scenario.sources.is_empty()).then_some(scenario.domain.span)
 }
 
+/// The first expression of flow or sides that reads the time.
+fn changing(scenario: &Scenario) -> Option<Span> {
+    let mut list: Vec<&Expr> = Vec::new();
+    match scenario.flow.as_ref().map(|flow| &flow.value) {
+        Some(Flow::Expression(exprs, _)) => list.extend(exprs),
+        Some(Flow::Darcy(darcy)) => {
+            list.extend(darcy.sides.iter().flatten().filter_map(DarcySide::value));
+            list.extend(darcy.wells.iter().map(|well| &well.rate));
+        }
+        Some(Flow::Uniform(_) | Flow::File(_)) | None => {}
+    }
+    for patch in scenario.domain.axes.iter().flat_map(|axis| axis.patches.iter().flatten()) {
+        if let SideRule::Inflow(own) | SideRule::Held(own) = &patch.rule {
+            list.extend(own.iter().map(|(_, c)| c));
+        }
+    }
+    list.into_iter().find(|expr| expr.reads_time()).map(|expr| expr.span)
+}
+
 /// What only masses can do.
 fn of_fluid(checker: &mut Checker<'_>, scenario: &Scenario) {
     let mut wrong: Vec<(&str, Span, &str)> = Vec::new();
@@ -101,6 +120,14 @@ fn of_fluid(checker: &mut Checker<'_>, scenario: &Scenario) {
     if let Some(span) = moving_walls(scenario).filter(|_| !is_plain) {
         let help = "leave `frame moving` out, or let the sides be `open`";
         wrong.push(("walls that move with the frame", span, help));
+    }
+    if let Some(span) = changing(scenario) {
+        wrong.push(("flow or sides that change in time", span, MASSES));
+    }
+    if let Some(Flow::Darcy(darcy)) = scenario.flow.as_ref().map(|flow| &flow.value)
+        && let Some((_, carried)) = darcy.wells.iter().find_map(|well| well.carrying.first())
+    {
+        wrong.push(("wells that carry something", carried.span, MASSES));
     }
     for (what, span, help) in wrong {
         checker.report(

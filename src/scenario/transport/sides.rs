@@ -345,8 +345,11 @@ pub fn carried<'a>(
     statements: &Statements<'a>,
     domain: &mut Domain,
 ) -> Option<()> {
-    let of_statement: Vec<Option<Vec<(usize, super::Expr)>>> =
-        statements.boundaries.iter().map(|statement| concentrations(checker, &statement.carried)).collect();
+    let of_statement: Vec<Option<Vec<(usize, super::Expr)>>> = statements
+        .boundaries
+        .iter()
+        .map(|statement| concentrations(checker, &statement.carried, Allow::REFERENCE))
+        .collect();
     let is_right = of_statement.iter().all(Option::is_some);
     for patch in domain.axes.iter_mut().flat_map(|axis| &mut axis.patches).flatten() {
         if let (SideRule::Inflow(list) | SideRule::Held(list), Some(Some(known))) =
@@ -358,16 +361,17 @@ pub fn carried<'a>(
     is_right.then_some(())
 }
 
-/// `A = 1 mg/L, B = 0`: each species once, its concentration over the place.
-fn concentrations<'a>(
+/// `A = 1 mg/L, B = 0`: each species once, its concentration over place and time as far as these may be named.
+pub fn concentrations<'a>(
     checker: &mut Checker<'a>,
     written: &'a [tree::Assignment],
+    allow: Allow,
 ) -> Option<Vec<(usize, super::Expr)>> {
     let mut list: Vec<(usize, super::Expr)> = Vec::new();
     let mut is_right = true;
     for (place, assignment) in written.iter().enumerate() {
         let species = species_index(checker, &assignment.name);
-        let value = checker.check(&assignment.value, Allow::PLACE);
+        let value = checker.check(&assignment.value, allow);
         let (Some(species), Some(value)) = (species, value) else {
             is_right = false;
             continue;

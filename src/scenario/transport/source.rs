@@ -148,7 +148,7 @@ fn source<'a>(
     };
     let mut sources = Vec::new();
     for (((species, strength), region), assignment) in list {
-        is_right &= check_strength(checker, strength, &region, during, written, assignment).is_some();
+        is_right &= check_strength(checker, &strength, &region, during, written, assignment).is_some();
         let window = match strength {
             Strength::Pulse(_) => None,
             _ => during.map(|(from, to)| (from.value, to.value)).or(Some((0.0, duration?))),
@@ -162,12 +162,11 @@ fn source<'a>(
 /// What the dimension of the value says.
 fn strength<'a>(checker: &mut Checker<'a>, written: &'a tree::Assignment) -> Option<(usize, Strength)> {
     let species = species_index(checker, &written.name);
-    let value = checker.check(&written.value, Allow::CONSTANT);
+    let value = checker.check(&written.value, Allow::TIME);
     let (species, value) = (species?, value?);
     let concentration = checker.concentration_of(species)?;
     let n_axes = checker.axes.len();
     let wanted = dimensions(concentration, n_axes);
-    let number = value.value()?;
     let what = format!("what the source gives of `{}`", written.name.value);
     let found = match value.kind {
         Type::Zero => Some(0),
@@ -178,9 +177,26 @@ fn strength<'a>(checker: &mut Checker<'a>, written: &'a tree::Assignment) -> Opt
         report_dimension(checker, written, value.kind, wanted, n_axes);
         return None;
     };
-    let shown = format!("{} (SI)", precise(number));
-    checker.require(number >= 0.0, &what, shown, "zero or more", written.value.span)?;
-    let strength = [Strength::Held(number), Strength::Rate(number), Strength::Pulse(number)][found];
+    let constant = value.value();
+    if let Some(number) = constant {
+        let shown = format!("{} (SI)", precise(number));
+        checker.require(number >= 0.0, &what, shown, "zero or more", written.value.span)?;
+    }
+    let strength = match (found, constant) {
+        (0, _) => Strength::Held(value),
+        (1, _) => Strength::Rate(value),
+        (_, Some(number)) => Strength::Pulse(number),
+        (_, None) => {
+            checker.report(
+                Diagnostic::error(M031, "an amount comes at once, at the start of the run")
+                    .at(written.value.span, "this changes in time")
+                    .found("an amount and `t`")
+                    .expected("an amount per time that changes, or a constant amount")
+                    .help("divide the amount by the time that it takes"),
+            );
+            return None;
+        }
+    };
     Some((species, strength))
 }
 
@@ -217,7 +233,7 @@ pub(super) fn report_dimension(
 
 fn check_strength(
     checker: &mut Checker<'_>,
-    strength: Strength,
+    strength: &Strength,
     region: &Region,
     during: Option<(Value, Value)>,
     written: &tree::Source,

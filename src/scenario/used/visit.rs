@@ -3,9 +3,9 @@
 //! Owns the walk. May use the tree. It deliberately knows no meaning: who visits says what to do.
 
 use crate::syntax::tree::{
-    Assignment, Axis, Count, DarcyEntry, DarcyKind, Dispersion, Expr, ExprKind, Field, FileValue,
-    FlowArgument, Name, Output, Place, Range, Rate, RegionArgument, Source, StatementKind, SweepAxis,
-    SweepEntry, SweepValue, Times,
+    Assignment, Axis, Change, ChangeTimes, Count, DarcyEntry, DarcyKind, Dispersion, Expr, ExprKind, Field,
+    FileValue, FlowArgument, Name, Output, Place, Range, Rate, RegionArgument, Source, StatementKind,
+    SweepAxis, SweepEntry, SweepValue, Times,
 };
 
 /// What is done at each place.
@@ -106,18 +106,21 @@ fn transport(kind: &mut StatementKind, visitor: &mut impl Visitor) {
             assignments(&mut it.carried, visitor);
             it.rate.iter_mut().for_each(|it| expression(&mut it.value, visitor));
         }
-        StatementKind::Flow(it) => match &mut it.argument {
-            FlowArgument::None => {}
-            FlowArgument::Value(it) | FlowArgument::Assigned(it) => expression(it, visitor),
-            FlowArgument::Entries(list) => list.iter_mut().for_each(|it| darcy_entry(it, visitor)),
-            FlowArgument::Files(_, list) => {
-                for entry in list {
-                    if let FileValue::Value(it) = &mut entry.value {
-                        expression(it, visitor);
+        StatementKind::Flow(it) => {
+            match &mut it.argument {
+                FlowArgument::None => {}
+                FlowArgument::Value(it) | FlowArgument::Assigned(it) => expression(it, visitor),
+                FlowArgument::Entries(list) => list.iter_mut().for_each(|it| darcy_entry(it, visitor)),
+                FlowArgument::Files(_, list) => {
+                    for entry in list {
+                        if let FileValue::Value(it) = &mut entry.value {
+                            expression(it, visitor);
+                        }
                     }
                 }
             }
-        },
+            it.change.iter_mut().for_each(|it| change(it, visitor));
+        }
         StatementKind::Dispersion(Dispersion::Value(it)) => expression(it, visitor),
         StatementKind::Dispersion(Dispersion::Parts(list)) => fields(list, visitor),
         StatementKind::Source(it) => source(it, visitor),
@@ -144,8 +147,17 @@ fn darcy_entry(entry: &mut DarcyEntry, visitor: &mut impl Visitor) {
             expression(&mut it.at, visitor);
             it.rate.iter_mut().for_each(|it| expression(it, visitor));
             it.screen.iter_mut().for_each(|it| range(it, visitor));
+            assignments(&mut it.carrying, visitor);
         }
+        DarcyKind::Change(it) => change(it, visitor),
         DarcyKind::Grid(counts) => expressions(counts, visitor),
+    }
+}
+
+fn change(change: &mut Change, visitor: &mut impl Visitor) {
+    match &mut change.times {
+        ChangeTimes::At(list) => expressions(list, visitor),
+        ChangeTimes::Every(it) => expression(it, visitor),
     }
 }
 

@@ -174,7 +174,8 @@ fn is_keyword(rule: Rule) -> bool {
         matches!(
             rule,
             R::kw_head | R::kw_flux | R::kw_no_flow | R::kw_periodic | R::kw_conductivity | R::kw_anisotropy
-        ) || matches!(rule, R::kw_well | R::kw_rate | R::kw_screen | R::kw_grid | R::kw_during);
+        ) || matches!(rule, R::kw_well | R::kw_rate | R::kw_screen | R::kw_grid | R::kw_during)
+            || matches!(rule, R::kw_change | R::kw_carrying);
     begins || joins || of_transport
 }
 

@@ -4,12 +4,12 @@
 //! resolves no name.
 
 use super::statements::{Once, assignment, axis, counts, each, field};
-use super::{Parts, span_at, spanned};
+use super::{Parts, Place, span_at, spanned};
 use crate::syntax::climb::Built;
 use crate::syntax::grammar::Rule;
 use crate::syntax::tree::{
-    Assignment, Boundary, Column, DarcyEntry, DarcyKind, Dispersion, Expr, Field, FileEntry, FileValue, Flow,
-    FlowArgument, Name, RegionArgument, Source, Well,
+    Assignment, Boundary, Change, ChangeTimes, Column, DarcyEntry, DarcyKind, Dispersion, Expr, Field,
+    FileEntry, FileValue, Flow, FlowArgument, Name, RegionArgument, Source, Well,
 };
 use pest::iterators::Pair;
 
@@ -38,18 +38,33 @@ pub fn flow(parts: &mut Parts) -> Built<Flow> {
     let text = parts.pairs.clone().find(|pair| matches!(pair.as_rule(), Rule::assign | Rule::darcy));
     let is_assigned = text.is_some_and(|pair| pair.as_rule() == Rule::assign);
     let kind = parts.wrapped_name(Rule::kind)?;
-    if let Some(pair) = parts.take(Rule::files) {
-        return Ok(Flow { kind, argument: files(&mut Parts::of(parts.place, pair))? });
-    }
+    let files = parts.take(Rule::files).map(|pair| files(&mut Parts::of(parts.place, pair))).transpose()?;
     let argument = match parts.take(Rule::darcy) {
+        None if let Some(files) = files => files,
         Some(pair) => FlowArgument::Entries(entries(&mut Parts::of(parts.place, pair))?),
+        None if parts.pairs.peek().is_some_and(|pair| pair.as_rule() == Rule::change) => FlowArgument::None,
         None => match parts.optional_expression()? {
             Some(value) if is_assigned => FlowArgument::Assigned(value),
             Some(value) => FlowArgument::Value(value),
             None => FlowArgument::None,
         },
     };
-    Ok(Flow { kind, argument })
+    let change = parts.take(Rule::change).map(|pair| change(parts.place, pair)).transpose()?;
+    Ok(Flow { kind, argument, change })
+}
+
+fn change(place: Place, pair: Pair<Rule>) -> Built<Change> {
+    let span = pair
+        .clone()
+        .into_inner()
+        .next()
+        .map_or_else(|| span_at(place, &pair), |keyword| span_at(place, &keyword));
+    let mut inner = Parts::of(place, pair);
+    let times = match inner.take(Rule::change_times) {
+        Some(pair) => ChangeTimes::At(Parts::of(place, pair).expressions()?),
+        None => ChangeTimes::Every(Parts::of(place, inner.need(Rule::every)?).expression()?),
+    };
+    Ok(Change { span, times })
 }
 
 fn files(parts: &mut Parts) -> Built<FlowArgument> {
@@ -105,6 +120,9 @@ fn entries(parts: &mut Parts) -> Built<Vec<DarcyEntry>> {
 
 fn entry(parts: &Parts, pair: Pair<Rule>) -> Built<DarcyKind> {
     let rule = pair.as_rule();
+    if rule == Rule::change {
+        return Ok(DarcyKind::Change(change(parts.place, pair)?));
+    }
     let mut inner = Parts::of(parts.place, pair);
     Ok(match rule {
         Rule::head => DarcyKind::Head(each(&mut inner, Rule::side_value, side_value)?),
@@ -125,16 +143,20 @@ fn side_value(parts: &mut Parts) -> Built<(Name, Expr)> {
 
 fn well(parts: &mut Parts) -> Built<Well> {
     let (name, at) = (parts.name()?, parts.expression()?);
-    let (mut rate, mut screen) = (Once::default(), Once::default());
+    let (mut rate, mut screen, mut carrying) = (Once::default(), Once::default(), Once::default());
     while let Some(pair) = parts.next() {
         let (rule, span) = (pair.as_rule(), span_at(parts.place, &pair));
         let mut inner = Parts::of(parts.place, pair);
         match rule {
             Rule::well_rate => rate.set("rate", span, inner.expression()?)?,
+            Rule::well_carrying => {
+                carrying.set("carrying", span, each(&mut inner, Rule::assignment, assignment)?)?
+            }
             _ => screen.set("screen", span, inner.range()?)?,
         }
     }
-    Ok(Well { name, at, rate: rate.value(), screen: screen.value() })
+    let carrying = carrying.value().unwrap_or_default();
+    Ok(Well { name, at, rate: rate.value(), screen: screen.value(), carrying })
 }
 
 pub fn dispersion(parts: &mut Parts) -> Built<Dispersion> {

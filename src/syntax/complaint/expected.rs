@@ -68,6 +68,9 @@ pub fn literal(rule: Rule) -> Option<&'static str> {
         R::kw_screen | R::screen => "screen",
         R::kw_grid => "grid",
         R::kw_during | R::during => "during",
+        R::kw_change | R::change => "change",
+        R::kw_carrying | R::well_carrying => "carrying",
+        R::change_times => "at",
         _ => return None,
     })
 }

@@ -24,6 +24,8 @@ pub struct Flow {
     /// A catalogue name: `uniform`, `velocity`, `darcy`, `table`, `grid`, `modflow`.
     pub kind: Name,
     pub argument: FlowArgument,
+    /// `change every 1 d`, after anything but braces.
+    pub change: Option<Change>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -65,6 +67,22 @@ pub struct Column {
     pub unit: Option<Name>,
 }
 
+/// When a flow that changes is looked at again, or solved for again.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Change {
+    /// The word.
+    pub span: Span,
+    pub times: ChangeTimes,
+}
+
+#[derive(Debug, Clone, PartialEq)]
+pub enum ChangeTimes {
+    /// `change at 30 d, 60 d`
+    At(Vec<Expr>),
+    /// `change every 1 d`
+    Every(Expr),
+}
+
 #[derive(Debug, Clone, PartialEq)]
 pub struct DarcyEntry {
     /// The word that it begins with.
@@ -86,15 +104,17 @@ pub enum DarcyKind {
     Well(Box<Well>),
     /// `grid 400 x 160`
     Grid(Vec<Expr>),
+    Change(Change),
 }
 
-/// `well pump at (50 m, 30 m) rate -3 m^3/d screen 2 m .. 8 m`
+/// `well pump at (50 m, 30 m) rate -3 m^3/d screen 2 m .. 8 m`, `… carrying S = 5 mg/L`
 #[derive(Debug, Clone, PartialEq)]
 pub struct Well {
     pub name: Name,
     pub at: Expr,
     pub rate: Option<Expr>,
     pub screen: Option<Range>,
+    pub carrying: Vec<Assignment>,
 }
 
 #[derive(Debug, Clone, PartialEq)]
