@@ -13,7 +13,7 @@ const POINTS: usize = 64;
 
 impl<const D: usize> Site<'_, D> {
     /// The cells whose porosity counts, where it may differ between them: a particle's water is that of its cell.
-    fn pores(&self) -> Option<&FaceFlow> {
+    pub fn pores(&self) -> Option<&FaceFlow> {
         let is_constant = matches!(self.transport.porosity.operations[..], [Operation::Constant(_)]);
         let may_differ = !is_constant || matches!(self.transport.flow, Flow::File(_));
         self.flow.as_deref().filter(|_| may_differ)

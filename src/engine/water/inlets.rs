@@ -97,7 +97,7 @@ fn discharge<const D: usize, M: Medium<D>>(
         let centre: [f64; D] = std::array::from_fn(|other| 0.5 * (low[other] + high[other]));
         let others = (0..D).filter(|&other| other != axis);
         let area: f64 = others.map(|other| high[other] - low[other]).product();
-        let porosity = site.evaluate(&site.transport.porosity, &[centre], 0.0)[0];
+        let porosity = site.porosity(&[centre])[0];
         (low, high, sign * porosity * area * tracker.medium.velocity(centre, axis))
     };
     faces.into_iter().map(gush).collect()
@@ -123,7 +123,7 @@ fn largest_discharge<const D: usize, M: Medium<D>>(site: &Site<D>, tracker: &Tra
             rest /= POINTS;
             site.low[axis] + part * (site.high[axis] - site.low[axis])
         });
-        let porosity = site.evaluate(&site.transport.porosity, &[place], 0.0)[0];
+        let porosity = site.porosity(&[place])[0];
         for axis in 0..D {
             largest = largest.max((porosity * tracker.medium.velocity(place, axis)).abs());
         }

@@ -13,11 +13,11 @@ use crate::state::stream::{Purpose, Stream};
 
 /// Water in each part of the domain; nothing where porosity is the same everywhere.
 pub fn cells<const D: usize>(site: &Site<D>) -> Option<Cells<D>> {
-    let porosity = &site.transport.porosity;
-    if matches!(porosity.operations[..], [Operation::Constant(_)]) {
+    let is_constant = matches!(site.transport.porosity.operations[..], [Operation::Constant(_)]);
+    if is_constant && site.pores().is_none() {
         return None;
     }
-    Some(Cells::new(site.low, site.high, |centres| site.evaluate(porosity, centres, 0.0)))
+    Some(Cells::new(site.low, site.high, |centres| site.porosity(centres)))
 }
 
 /// Water of each bin over that of the mean one.
