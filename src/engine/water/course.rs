@@ -62,11 +62,9 @@ pub struct Launched<const D: usize> {
 /// Makes the current of a site, and what comes in with it.
 pub struct Launch<'a> {
     pub width: Width,
-    /// Of a parcel.
+    /// Of a parcel, with the zones that are stored and the components that it carries.
     pub volume: f64,
-    /// Zones that are stored.
     pub n_slots: usize,
-    /// Components that are carried.
     pub n: usize,
     /// Outputs of what passes leave them.
     pub dues: &'a mut Vec<Due>,
