@@ -26,20 +26,6 @@ use crate::plan::transport::Patch;
 use crate::state::particles::Block;
 use std::sync::Arc;
 
-/// What moves parcels.
-pub trait Current<const D: usize>: Send + Sync {
-    /// Takes a block through a step, and those out of it that leave. `entered` is the part of the step that is over
-    /// when each comes in; nothing for parcels that have been there.
-    fn carry(
-        &self,
-        steps: Steps,
-        entered: &[f64],
-        watched: &Watched,
-        block: &mut Block<D>,
-        passage: &mut Passage<D>,
-    );
-}
-
 /// A tracker in a medium, with what sides do to parcels.
 struct Course<const D: usize, M: Medium<D>> {
     tracker: Tracker<D, M>,
@@ -113,6 +99,20 @@ fn range<const D: usize>(site: &Site<D>, axes: &[usize], n: usize, component: us
     };
     let all = site.transport.sides.iter().flatten().flatten().map(of_patch);
     all.fold((0.0, 0.0), |(lowest, highest): (f64, f64), (low, high)| (lowest.min(low), highest.max(high)))
+}
+
+/// What moves parcels.
+pub trait Current<const D: usize>: Send + Sync {
+    /// Takes a block through a step, and those out of it that leave. `entered` is the part of the step that is over
+    /// when each comes in; nothing for parcels that have been there.
+    fn carry(
+        &self,
+        steps: Steps,
+        entered: &[f64],
+        watched: &Watched,
+        block: &mut Block<D>,
+        passage: &mut Passage<D>,
+    );
 }
 
 impl<const D: usize, M: Medium<D> + Send + 'static> Current<D> for Course<D, M> {
