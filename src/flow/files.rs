@@ -8,7 +8,8 @@ use super::read::modflow6::{self, Files, Settings, Side};
 use super::read::table::{self, Column, Layout, Rows};
 use super::read::window::{Extent, placed, within};
 use super::read::{Kind, Quantity, ReadError, csv, npy, parquet};
-use super::{Balance, FaceFlow};
+use super::series::Period;
+use super::{Balance, FaceFlow, FlowSeries};
 use crate::plan::tape::Tape;
 use crate::plan::transport::{
     FileColumn, FileForm, FlowFacts, FlowFile, ModflowForm, Outlet, TableForm, Velocity,
@@ -18,7 +19,7 @@ use std::sync::Arc;
 /// A flow and what a plan is told of it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Loaded {
-    pub flow: Arc<FaceFlow>,
+    pub flows: FlowSeries,
     pub facts: FlowFacts,
 }
 
@@ -66,14 +67,23 @@ pub fn read(file: &FlowFile, bytes: &[&[u8]], setting: &Setting) -> Result<Loade
         });
     }
     let of_first = |error| Trouble { file: 0, error };
-    let (flow, outlets) = match &file.form {
-        FileForm::Table(form) => (table(form, bytes[0], setting).map_err(of_first)?, Vec::new()),
-        FileForm::Arrays(form) => (arrays(form, bytes, setting)?, Vec::new()),
+    let (flows, outlets) = match &file.form {
+        FileForm::Table(form) => (vec![(0.0, table(form, bytes[0], setting).map_err(of_first)?)], Vec::new()),
+        FileForm::Arrays(form) => (vec![(0.0, arrays(form, bytes, setting)?)], Vec::new()),
         FileForm::Modflow(form) => modflow(form, bytes, setting).map_err(of_first)?,
     };
-    let flow = within(flow, setting.axes).map_err(of_first)?;
-    let facts = facts(&flow, setting.axes, outlets);
-    Ok(Loaded { flow: Arc::new(flow), facts })
+    let mut periods = Vec::new();
+    for (from, flow) in flows {
+        let flow = Arc::new(within(flow, setting.axes).map_err(of_first)?);
+        periods.push(Period { from, flow });
+    }
+    let flows = FlowSeries::new(periods).map_err(|error| {
+        let error =
+            ReadError::new(Kind::Unsupported, format!("the time steps do not follow one another: {error}"));
+        of_first(error.help("layers whose water table moves hold another amount of water in each step"))
+    })?;
+    let facts = facts(&flows, setting.axes, outlets);
+    Ok(Loaded { flows, facts })
 }
 
 fn table(form: &TableForm, bytes: &[u8], setting: &Setting) -> Result<FaceFlow, ReadError> {
@@ -126,12 +136,12 @@ fn arrays(form: &Velocity, bytes: &[&[u8]], setting: &Setting) -> Result<FaceFlo
     flow.and_then(|flow| placed(flow, setting.axes)).map_err(|error| Trouble { file: 0, error })
 }
 
-/// The flow, and names of what takes water out by owner.
+/// Flows and when they begin, and names of what takes water out by owner.
 fn modflow(
     form: &ModflowForm,
     bytes: &[&[u8]],
     setting: &Setting,
-) -> Result<(FaceFlow, Vec<Outlet>), ReadError> {
+) -> Result<(Vec<(f64, FaceFlow)>, Vec<Outlet>), ReadError> {
     let sides: Vec<(String, Side)> = form
         .sides
         .iter()
@@ -141,57 +151,78 @@ fn modflow(
     let porosity = |_: usize, place: [f64; 3]| setting.porosity_at(moved(place));
     let settings = Settings { length: form.length, time: form.time, porosity: &porosity, sides: &sides };
     let files = Files { budget: bytes[0], grid: bytes[1], heads: bytes.get(2).copied() };
-    let series = modflow6::read(files, &settings)?;
-    let n_steps = series.periods.len();
-    let mut periods = series.periods.into_iter();
-    let (Some(period), None) = (periods.next(), periods.next()) else {
-        let message = format!("the budget file has {n_steps} time steps, and a flow that is read is steady");
-        return Err(ReadError::new(Kind::Unsupported, message).help("save the budget of one time step"));
-    };
-    let names: Vec<Outlet> =
-        period
-            .packages
-            .iter()
-            .enumerate()
-            // Water that is stored stays where it is, with all that it carries.
-            .filter(|(_, package)| !package.kind.starts_with("STO"))
-            .map(|(owner, package)| {
-                let name = if package.name.is_empty() { &package.kind } else { &package.name };
-                Outlet { name: name.clone(), owner }
-            })
-            .chain((0..3).map(|axis| Outlet {
-                name: format!("across_{}", ["x", "y", "z"][axis]),
-                owner: ACROSS + axis,
-            }))
-            .collect();
     let keep: Vec<usize> = setting.axes.iter().map(|&(index, ..)| index).collect();
-    let mut flow = period.flow;
-    flow.cells = flow.cells.moved(form.origin).ok_or_else(|| {
-        ReadError::new(Kind::Mismatch, "the corner of the grid lies too far away for its cells")
-    })?;
-    Ok((placed(on_axes(flow, &keep)?, setting.axes)?, names))
+    let mut names = Names::default();
+    let mut flows = Vec::new();
+    for mut period in modflow6::read(files, &settings)?.periods {
+        names.enter(&mut period);
+        let mut flow = period.flow;
+        flow.cells = flow.cells.moved(form.origin).ok_or_else(|| {
+            ReadError::new(Kind::Mismatch, "the corner of the grid lies too far away for its cells")
+        })?;
+        flows.push((period.start, placed(on_axes(flow, &keep)?, setting.axes)?));
+    }
+    Ok((flows, names.outlets()))
 }
 
-/// What a plan is told of a flow.
-fn facts(flow: &FaceFlow, axes: &[Extent], known: Vec<Outlet>) -> FlowFacts {
-    let n = flow.cells.n();
-    let mut outlets: Vec<Outlet> = Vec::new();
-    for mut outlet in known {
-        if flow.sinks.iter().any(|sink| sink.owner == outlet.owner && sink.rate > 0.0) {
-            while outlets.iter().any(|other| other.name == outlet.name) {
-                outlet.name.push('_');
+/// Packages of all time steps: kind and name, in the order in which they come up.
+#[derive(Default)]
+struct Names(Vec<(String, String)>);
+
+impl Names {
+    /// Gives the sinks of a time step owners that are the same in all of them.
+    fn enter(&mut self, period: &mut modflow6::Period) {
+        let mut owner_of = Vec::new();
+        for package in &period.packages {
+            let own = (package.kind.clone(), package.name.clone());
+            let known = self.0.iter().position(|other| *other == own);
+            owner_of.push(known.unwrap_or(self.0.len()));
+            if known.is_none() {
+                self.0.push(own);
             }
-            outlets.push(outlet);
+        }
+        for sink in &mut period.flow.sinks {
+            sink.owner = owner_of.get(sink.owner).copied().unwrap_or(sink.owner);
         }
     }
-    let Balance { worst_of_through_flow, worst_divergence, rms_divergence, .. } = flow.balance();
+
+    fn outlets(self) -> Vec<Outlet> {
+        let across = (0..3)
+            .map(|axis| Outlet { name: format!("across_{}", ["x", "y", "z"][axis]), owner: ACROSS + axis });
+        let packages = self.0.into_iter().enumerate();
+        packages
+            // Water that is stored stays where it is, with all that it carries.
+            .filter(|(_, (kind, _))| !kind.starts_with("STO"))
+            .map(|(owner, (kind, name))| Outlet { name: if name.is_empty() { kind } else { name }, owner })
+            .chain(across)
+            .collect()
+    }
+}
+
+/// What a plan is told of flows: of several the fastest, and the one that keeps its water worst.
+fn facts(flows: &FlowSeries, axes: &[Extent], known: Vec<Outlet>) -> FlowFacts {
+    let all: Vec<&FaceFlow> = flows.periods().iter().map(|period| &*period.flow).collect();
+    let n = flows.flow(0).cells.n();
+    let takes = |outlet: &Outlet| {
+        all.iter().flat_map(|flow| &flow.sinks).any(|sink| sink.owner == outlet.owner && sink.rate > 0.0)
+    };
+    let mut outlets: Vec<Outlet> = Vec::new();
+    for mut outlet in known.into_iter().filter(takes) {
+        while outlets.iter().any(|other| other.name == outlet.name) {
+            outlet.name.push('_');
+        }
+        outlets.push(outlet);
+    }
+    let balances: Vec<Balance> = all.iter().map(|flow| flow.balance()).collect();
     let finite = |value: f64| if value.is_finite() { value } else { f64::MAX };
+    let worst = |of: fn(&Balance) -> f64| balances.iter().map(|own| finite(of(own))).fold(0.0, f64::max);
     FlowFacts {
         cells: axes.iter().map(|&(index, ..)| n[index]).collect(),
-        speed: finite(speed(flow)),
+        speed: all.iter().map(|flow| finite(speed(flow))).fold(0.0, f64::max),
         outlets,
-        missing: finite(worst_of_through_flow),
-        divergence: [finite(worst_divergence), finite(rms_divergence)],
+        missing: worst(|own| own.worst_of_through_flow),
+        divergence: [worst(|own| own.worst_divergence), worst(|own| own.rms_divergence)],
+        changes: flows.changes(),
     }
 }
 

@@ -6,13 +6,13 @@
 use super::files::Trouble;
 use super::read::window::Extent;
 use super::store::Flows;
-use crate::diagnostic::codes::{M005, M033, N205};
+use crate::diagnostic::codes::{M005, M026, M033, N205};
 use crate::diagnostic::{Diagnostic, number};
 use crate::plan::build_tape::build_tape;
 use crate::plan::tape::{Operation, Tape};
 use crate::plan::transport::FlowFacts;
 use crate::scenario::transport::{FileFlow, Flow};
-use crate::scenario::{Output, Scenario, Station};
+use crate::scenario::{Output, Particles, Scenario, Station};
 use crate::source::{Sources, Span};
 
 /// Divergence in a cell, relative to mean discharge over cell size, above which concentrations show it.
@@ -34,10 +34,25 @@ pub fn attach(scenario: &mut Scenario, sources: &Sources, flows: &Flows) -> Vec<
         Err(trouble) => vec![refusal(own, &trouble)],
         Ok(loaded) => {
             own.facts = Some(loaded.facts.clone());
+            let changes = changing(&scenario.particles, &loaded.facts, span);
             let outputs = scenario.outputs.iter().filter_map(|output| unknown_outlet(output, &loaded.facts));
-            warning(&loaded.facts, span).into_iter().chain(outputs).collect()
+            warning(&loaded.facts, span).into_iter().chain(changes).chain(outputs).collect()
         }
     }
+}
+
+/// Parcels of water in a flow that changes.
+fn changing(particles: &Particles, facts: &FlowFacts, span: Span) -> Option<Diagnostic> {
+    if particles.shares.is_some() || facts.changes.is_empty() {
+        return None;
+    }
+    let message = Diagnostic::error(M026, "fluid particles have no flow that changes in time")
+        .at(span, "not with particles of fluid")
+        .also(particles.kind_span, "particles of fluid")
+        .found(format!("{} flows one after another", facts.changes.len() + 1))
+        .expected("what parcels of water can do")
+        .help("write `particles mass` and a number, or save the budget of one time step");
+    Some(message)
 }
 
 /// An output at a well that the files do not have.

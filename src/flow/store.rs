@@ -87,7 +87,7 @@ impl Flows {
             Flow::File(flow) => {
                 let loaded = self.read(&flow.file, &extents(plan), &transport.porosity, sources);
                 let loaded = loaded.map_err(|trouble| FlowError::File(trouble.error.to_string()))?;
-                Ok(Some(FlowSeries::steady(loaded.flow.clone())))
+                Ok(Some(loaded.flows.clone()))
             }
             Flow::Darcy(darcy) => {
                 if !transport.changes.is_empty() {
@@ -149,7 +149,7 @@ fn size(flow: &FaceFlow) -> usize {
 }
 
 fn size_of_read(read: &Read) -> usize {
-    read.as_ref().map_or(0, |loaded| size(&loaded.flow))
+    read.as_ref().map_or(0, |loaded| loaded.flows.periods().iter().map(|period| size(&period.flow)).sum())
 }
 
 fn size_of_solved(solved: &Solved) -> usize {

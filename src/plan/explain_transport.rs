@@ -110,6 +110,13 @@ fn file_lines(flow: &FileFlow) -> Vec<String> {
     let cells: Vec<String> = flow.facts.cells.iter().map(ToString::to_string).collect();
     let mut lines = vec![format!("flow: read from {} on {} cells", names.join(", "), cells.join(" x "))];
     lines.extend(flow.file.files.iter().map(|file| format!("  {}: BLAKE3 {}", file.name, file.hash)));
+    if !flow.facts.changes.is_empty() {
+        let n = flow.facts.changes.len() + 1;
+        lines.push(format!(
+            "  {n} steady flows one after another, the later ones from {} s",
+            list(&flow.facts.changes)
+        ));
+    }
     lines.push(format!("  pore velocity: root mean square {} m/s", number(flow.facts.speed)));
     let [worst, typical] = flow.facts.divergence;
     lines.push(format!(

@@ -96,6 +96,9 @@ pub struct FlowFacts {
     /// … the divergence that this is, relative to mean discharge over cell size: in the worst cell, and its root mean
     /// square.
     pub divergence: [f64; 2],
+    /// When other flows of the files begin, s since the start of the run; none if the flow is steady.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub changes: Vec<f64>,
 }
 
 /// Something that takes water out of cells.
