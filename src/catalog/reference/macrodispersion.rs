@@ -78,7 +78,9 @@ fn plume(values: &[f64], shape: fn(f64) -> f64) -> Built {
     let [variance, length, velocity, dispersion, width] = checked(ARGUMENTS, values)?;
     Ok(of_time(move |t| {
         let t = t.max(0.0);
-        variance * length * length * shape(velocity * t / length) + 2.0 * dispersion * t + width * width
+        // Beyond this many lengths the moments of a length as short have no digit left.
+        let tau = (velocity * t / length).min(1e150);
+        variance * length * length * shape(tau) + 2.0 * dispersion * t + width * width
     }))
 }
 

@@ -21,6 +21,8 @@ fn plain_value(name: &str) -> f64 {
         "width" => 0.01,
         "V" => 1e-3,
         "K" => 0.4,
+        "variance" => 0.25,
+        "length" => 0.05,
         other => panic!("give the argument `{other}` a value for tests"),
     }
 }

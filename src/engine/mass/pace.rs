@@ -7,6 +7,8 @@ use std::collections::VecDeque;
 
 /// Distance of a rate from a straight line that is not cut further, of the largest rate.
 const STRAIGHT: f64 = 1e-4;
+/// Doubt of the mass of a piece that is not cut further, of the whole mass.
+const SURE: f64 = 1e-7;
 /// Distance of the bounds of a rate, of the largest rate, beyond which there may be something between the points.
 const LOOSE: f64 = 0.5;
 /// Pieces, and numbers kept for them in all.
@@ -48,11 +50,17 @@ impl Look {
     fn new(from: f64, to: f64, n_parts: usize, rates: &mut dyn FnMut(f64, &mut [f64])) -> Self {
         let length = to - from;
         let at = [MARGIN, 0.25, 0.5, 0.75, 1.0 - MARGIN].map(|part| from + part * length);
-        let values = at.map(|t| {
+        let mut values = at.map(|t| {
             let mut values = vec![0.0; n_parts];
             rates(t, &mut values);
             values
         });
+        // On to the ends along straight lines.
+        const ON: f64 = MARGIN / (0.25 - MARGIN);
+        for k in 0..n_parts {
+            values[0][k] += ON * (values[0][k] - values[1][k]);
+            values[4][k] += ON * (values[4][k] - values[3][k]);
+        }
         Self { from, to, values }
     }
 
@@ -83,6 +91,17 @@ impl Look {
         let of = |k: usize| (7.0 * (a[k] + e[k]) + 32.0 * (b[k] + d[k]) + 12.0 * c[k]) / 90.0 * length;
         (0..a.len()).map(of).collect()
     }
+
+    /// Masses against those of Simpson's rule on three of the points.
+    fn doubt(&self) -> f64 {
+        let [a, _, c, _, e] = &self.values;
+        let simpson = |k: usize| (a[k] + 4.0 * c[k] + e[k]) / 6.0 * (self.to - self.from);
+        self.masses().iter().enumerate().map(|(k, mass)| (mass - simpson(k)).abs()).sum()
+    }
+
+    fn mass(&self) -> f64 {
+        self.masses().iter().sum()
+    }
 }
 
 impl Pace {
@@ -103,18 +122,22 @@ impl Pace {
             .collect();
         let highest = |look: &Look| (0..5).map(|point| look.sum(point)).fold(0.0, f64::max);
         let mut peak = open.iter().map(highest).fold(0.0, f64::max);
+        let mut whole_mass: f64 = open.iter().map(Look::mass).sum();
         let mut done: Vec<Look> = Vec::new();
         while let Some(look) = open.pop_front() {
             let is_short = look.to - look.from <= SHORTEST * whole;
-            let is_straight = look.bend() <= STRAIGHT * peak && width(look.from, look.to) <= LOOSE * peak;
-            if is_straight || is_short || done.len() + open.len() + 2 > most {
+            let is_straight = look.bend() <= STRAIGHT * peak && look.doubt() <= SURE * whole_mass;
+            let is_known = is_straight && width(look.from, look.to) <= LOOSE * peak;
+            if is_known || is_short || done.len() + open.len() + 2 > most {
                 done.push(look);
                 continue;
             }
             let middle = 0.5 * (look.from + look.to);
+            whole_mass -= look.mass();
             for (from, to) in [(look.from, middle), (middle, look.to)] {
                 let half = Look::new(from, to, n_parts, rates);
                 peak = peak.max(highest(&half));
+                whole_mass += half.mass();
                 open.push_back(half);
             }
         }
