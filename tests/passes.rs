@@ -3,11 +3,16 @@
 //! Passes that only drop and fuse keep every bit. Those that replace arithmetic by an equivalent
 //! (a conservation relation, fractions added before they multiply) change the last bits only.
 
+#[path = "support/data.rs"]
+mod data;
+
 use lamella::engine::snapshot::{Snapshot, Values};
 use lamella::engine::{Settings as EngineSettings, Unattended};
+use lamella::flow::FlowSeries;
 use lamella::plan::compile::{Compiled, Options, Selection};
 use lamella::scenario::Settings;
 use lamella::source::Sources;
+use std::path::Path;
 
 /// A scene with few particles and few steps: the proof needs no accuracy.
 fn small(text: &str) -> String {
@@ -25,15 +30,22 @@ fn small(text: &str) -> String {
 }
 
 fn compile(text: &str, passes: Selection) -> Compiled {
+    compile_in(Path::new(""), text, passes).0
+}
+
+/// The plan of a scene of a folder, and its flow if that comes from files.
+fn compile_in(folder: &Path, text: &str, passes: Selection) -> (Compiled, Option<FlowSeries>) {
     let mut sources = Sources::single("scene.lam", text);
     // One of the scenes uses this one.
     sources.add("used/column.lam", include_str!("scenes/used/column.lam"));
+    let sources = data::with_files(sources, folder);
     let checked = lamella::check(sources, &Settings::default(), &Options { passes, memory: None });
-    checked.compiled.unwrap_or_else(|| panic!("no plan: {:#?}", checked.diagnostics))
+    let flow = data::read_flow(&checked);
+    (checked.compiled.unwrap_or_else(|| panic!("no plan: {:#?}", checked.diagnostics)), flow)
 }
 
 /// The snapshots of the first steps.
-fn run(compiled: &Compiled) -> Vec<Snapshot> {
+fn run((compiled, flow): &(Compiled, Option<FlowSeries>)) -> Vec<Snapshot> {
     let mut plan = compiled.plan.clone();
     plan.time.n_steps = plan.time.n_steps.min(30);
     plan.time.duration = plan.time.duration.min(30.0 * plan.time.step);
@@ -45,7 +57,7 @@ fn run(compiled: &Compiled) -> Vec<Snapshot> {
         output.times.dedup();
     }
     let mut snapshots = Vec::new();
-    let settings = EngineSettings { threads: Some(2), ..EngineSettings::default() };
+    let settings = EngineSettings { threads: Some(2), flow: flow.clone(), ..EngineSettings::default() };
     lamella::engine::run(&plan, &settings, &Unattended, &mut |snapshot| {
         snapshots.push(snapshot);
         Ok(())
@@ -130,9 +142,9 @@ fn scenes() -> Vec<(String, String)> {
 #[test]
 fn passes_that_drop_and_fuse_keep_every_bit() {
     for (name, text) in scenes() {
-        let text = small(&text);
-        let literal = run(&compile(&text, Selection::None));
-        let lean = run(&compile(&text, Selection::KeepingBytes));
+        let (text, folder) = (small(&text), Path::new(&name).parent().expect("a folder"));
+        let literal = run(&compile_in(folder, &text, Selection::None));
+        let lean = run(&compile_in(folder, &text, Selection::KeepingBytes));
         assert_same(&literal, &lean, 0.0, &name);
     }
 }
@@ -143,10 +155,10 @@ fn passes_that_drop_and_fuse_keep_every_bit() {
 #[test]
 fn passes_that_replace_arithmetic_change_the_last_bits_only() {
     for (name, text) in scenes() {
-        let text = small(&text);
-        let literal = compile(&text, Selection::KeepingBytes);
-        let lean = compile(&text, Selection::All);
-        if literal.plan.axes.len() != lean.plan.axes.len() {
+        let (text, folder) = (small(&text), Path::new(&name).parent().expect("a folder"));
+        let literal = compile_in(folder, &text, Selection::KeepingBytes);
+        let lean = compile_in(folder, &text, Selection::All);
+        if literal.0.plan.axes.len() != lean.0.plan.axes.len() {
             continue;
         }
         assert_same(&run(&literal), &run(&lean), 1e-10, &name);

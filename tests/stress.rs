@@ -1,5 +1,8 @@
 //! Every shipped scene under stress: it runs, or it says at a line why it does not.
 
+#[path = "support/data.rs"]
+mod data;
+
 use lamella::plan::Options;
 use lamella::scenario::{Scenario, Settings};
 use lamella::source::Sources;
@@ -62,13 +65,14 @@ fn faults(verdict: &Verdict, tolerance: f64) -> Vec<String> {
 
 #[test]
 fn every_scene_runs_under_stress_or_says_at_a_line_why_not() {
-    let bounds = Bounds { particles: 100, time: Duration::from_millis(300) };
+    let mut bounds = Bounds { particles: 100, time: Duration::from_millis(300), flow: None };
     let (mut broken, mut n_finished, mut n_trials) = (Vec::new(), 0, 0);
     for path in scenes() {
         let text = std::fs::read_to_string(&path).expect("a scene can be read");
         let name = path.display().to_string();
-        let checked =
-            lamella::check(Sources::single(&*name, text), &Settings::default(), &Options::default());
+        let sources = data::with_files(Sources::single(&*name, text), path.parent().expect("a folder"));
+        let checked = lamella::check(sources, &Settings::default(), &Options::default());
+        bounds.flow = data::read_flow(&checked);
         let mut scenario = checked.scenario.unwrap_or_else(|| panic!("{name} is wrong"));
         assert!(checked.compiled.is_some(), "{name} is refused");
         shorten(&mut scenario);

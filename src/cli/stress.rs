@@ -4,8 +4,11 @@ use super::interrupt::Interrupt;
 use super::text::{Align, duration, significant, table};
 use super::{CommandResult, Exit, Stopped, Terminal, load, machine, record, run};
 use clap::ValueEnum;
+use lamella::Checked;
 use lamella::diagnostic::{Diagnostic, codes};
-use lamella::plan::Options;
+use lamella::flow::FlowSeries;
+use lamella::plan::transport::Flow;
+use lamella::plan::{Options, Plan};
 use lamella::scenario::{Scenario, Settings};
 use lamella::source::Sources;
 use lamella::stress::{Bounds, Fate, Knob, Trial, Verdict};
@@ -91,7 +94,9 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
     let trials = Trial::all(scenario, &knobs, arguments.decades, arguments.every);
     terminal.remark(&format!("{} trials of at most {} each", trials.len(), duration(arguments.seconds)));
     let begin = Instant::now();
-    let (verdicts, is_cancelled) = judge(arguments, scenario, &trials, &interrupt);
+    let time = Duration::from_secs_f64(arguments.seconds.clamp(1e-3, 1e9));
+    let bounds = Bounds { particles: arguments.particles, time, flow: read_flow(&checked, &compiled.plan) };
+    let (verdicts, is_cancelled) = judge(&bounds, scenario, &trials, &interrupt);
     let rows: Vec<StressRow> = verdicts.iter().map(|verdict| row(verdict, &checked.sources)).collect();
     if !is_cancelled {
         let out =
@@ -118,22 +123,26 @@ fn refuse_absent(asked: &[KnobName], scenario: &Scenario) -> Result<(), Stopped>
     Err(Stopped::new(Exit::SceneWrong, message))
 }
 
+/// The flow of a scene that has it from files; others are solved for in each trial.
+fn read_flow(checked: &Checked, plan: &Plan) -> Option<FlowSeries> {
+    let is_read = plan.transport.as_ref().is_some_and(|it| matches!(it.flow, Flow::File(_)));
+    is_read.then(|| checked.flows.of(plan, &checked.sources).ok().flatten()).flatten()
+}
+
 /// One trial after the other, as each uses all cores.
 fn judge(
-    arguments: &Arguments,
+    bounds: &Bounds,
     scenario: &Scenario,
     trials: &[Trial],
     interrupt: &Interrupt,
 ) -> (Vec<Verdict>, bool) {
     let options = Options { memory: machine::available_memory(), ..Options::default() };
-    let time = Duration::from_secs_f64(arguments.seconds.clamp(1e-3, 1e9));
-    let bounds = Bounds { particles: arguments.particles, time };
     let mut verdicts = Vec::new();
     for trial in trials {
         if interrupt.is_requested() {
             return (verdicts, true);
         }
-        verdicts.push(trial.run(scenario, &options, &bounds));
+        verdicts.push(trial.run(scenario, &options, bounds));
     }
     (verdicts, false)
 }

@@ -6,6 +6,7 @@ use super::Knob;
 use crate::diagnostic::{Diagnostic, Severity};
 use crate::engine::snapshot::{Outcome, Snapshot, Values};
 use crate::engine::{Control, RunError, Settings, run};
+use crate::flow::FlowSeries;
 use crate::plan::Plan;
 use crate::plan::compile::{Compiled, Options, compile_edited};
 use crate::scenario::Scenario;
@@ -22,12 +23,14 @@ const TIGHTEST: f64 = 1e-13;
 const LEAST: f64 = 1e-9;
 
 /// How much a trial may take.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Bounds {
     /// Particles at most, but as many as the bins need.
     pub particles: u64,
     /// Wall time of a run.
     pub time: Duration,
+    /// The flow of a scene that has it from files: no trial turns it.
+    pub flow: Option<FlowSeries>,
 }
 
 /// A knob turned by a power of ten.
@@ -160,7 +163,7 @@ impl Verdict {
 
     fn take(&mut self, scenario: &Scenario, compiled: &Compiled, bounds: &Bounds) {
         let begin = Instant::now();
-        let result = finish(&compiled.plan, bounds.time);
+        let result = finish(&compiled.plan, bounds);
         self.wall = begin.elapsed().as_secs_f64();
         let (outcome, snapshots) = match result {
             Ok(finished) => finished,
@@ -189,7 +192,7 @@ impl Verdict {
             self.fate = Fate::Negative;
             self.reason = Some("a concentration that is shown is below zero".to_owned());
         }
-        self.error = tolerance_error(&compiled.plan, &snapshots, bounds.time);
+        self.error = tolerance_error(&compiled.plan, &snapshots, bounds);
     }
 }
 
@@ -204,9 +207,10 @@ impl Control for Deadline {
     }
 }
 
-fn finish(plan: &Plan, time: Duration) -> Result<(Outcome, Vec<Snapshot>), RunError> {
+fn finish(plan: &Plan, bounds: &Bounds) -> Result<(Outcome, Vec<Snapshot>), RunError> {
     let mut snapshots = Vec::new();
-    let outcome = run(plan, &Settings::default(), &Deadline(Instant::now() + time), &mut |snapshot| {
+    let settings = Settings { flow: bounds.flow.clone(), ..Settings::default() };
+    let outcome = run(plan, &settings, &Deadline(Instant::now() + bounds.time), &mut |snapshot| {
         snapshots.push(snapshot);
         Ok(())
     })?;
@@ -233,13 +237,13 @@ fn extremes(snapshots: &[Snapshot]) -> (f64, f64) {
 }
 
 /// Relative difference, root of sums of squares, to a run with a tighter tolerance.
-fn tolerance_error(plan: &Plan, snapshots: &[Snapshot], time: Duration) -> Option<f64> {
+fn tolerance_error(plan: &Plan, snapshots: &[Snapshot], bounds: &Bounds) -> Option<f64> {
     let mut tighter = plan.clone();
     let chemistry = tighter.chemistry.as_mut()?;
     chemistry.kinetics.as_ref()?;
     chemistry.tolerance = (chemistry.tolerance * TIGHTER).max(TIGHTEST);
     chemistry.floors.iter_mut().for_each(|floor| *floor *= TIGHTER);
-    let (_, reference) = finish(&tighter, time).ok()?;
+    let (_, reference) = finish(&tighter, bounds).ok()?;
     let (mut difference, mut size) = (0.0, 0.0);
     for (own, other) in concentrations(snapshots).zip(concentrations(&reference)) {
         difference += (own - other) * (own - other);

@@ -5,6 +5,7 @@
 pub mod mutants;
 pub mod noise;
 
+use lamella::data::DataFile;
 use lamella::diagnostic::Diagnostic;
 use lamella::plan::compile::Options;
 use lamella::scenario::Settings;
@@ -12,6 +13,7 @@ use lamella::source::{FileId, Sources};
 use lamella::syntax::parse;
 use lamella::syntax::tree::TokenKind;
 use std::ops::Range;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// Kind and place of a token.
@@ -46,8 +48,17 @@ const USED: (&str, &str) = ("used/column.lam", include_str!("../scenes/used/colu
 pub fn sources(text: &str) -> Sources {
     let mut sources = Sources::single("scene.lam", text);
     sources.add(USED.0, USED.1);
+    // One of the scenes reads the flow of a model.
+    for (name, bytes) in FILES.iter().filter(|(name, _)| text.contains(name)) {
+        sources.add_data(Arc::new(DataFile::new((*name).to_owned(), bytes.to_vec())));
+    }
     sources
 }
+
+const FILES: &[(&str, &[u8])] = &[
+    ("valley.bud", include_bytes!("../../experiments/modflow6_import/valley.bud")),
+    ("valley.dis.grb", include_bytes!("../../experiments/modflow6_import/valley.dis.grb")),
+];
 
 /// Everything that `check` says about a text, in its order.
 pub fn messages(text: &str) -> Vec<Diagnostic> {
