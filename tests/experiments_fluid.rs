@@ -32,7 +32,7 @@ fn last_map(finished: &Finished, species: usize) -> Vec<f64> {
 fn smaller() -> String {
     let text = edited(SCENE, "n   = 500_000", "n   = 100_000");
     let text = edited(&text, "average bins 150 x 60", "average bins 50 x 20");
-    edited(&text, "on 100 x 60", "on 50 x 20")
+    edited(&text, "on 150 x 60", "on 50 x 20")
 }
 
 /// Every parcel has A and B of c0 in all before they meet: A + B + 2 C is c0 times the water. What comes in is even, so
