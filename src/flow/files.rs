@@ -136,12 +136,15 @@ fn arrays(form: &Velocity, bytes: &[&[u8]], setting: &Setting) -> Result<FaceFlo
     flow.and_then(|flow| placed(flow, setting.axes)).map_err(|error| Trouble { file: 0, error })
 }
 
-/// Flows and when they begin, and names of what takes water out by owner.
+/// Flows and when they begin, s.
+type Timed = Vec<(f64, FaceFlow)>;
+
+/// The flows of a budget, and names of what takes water out by owner.
 fn modflow(
     form: &ModflowForm,
     bytes: &[&[u8]],
     setting: &Setting,
-) -> Result<(Vec<(f64, FaceFlow)>, Vec<Outlet>), ReadError> {
+) -> Result<(Timed, Vec<Outlet>), ReadError> {
     let sides: Vec<(String, Side)> = form
         .sides
         .iter()

@@ -18,6 +18,8 @@ const MOST_NUMBERS: usize = 1 << 22;
 const SHORTEST: f64 = 1e-9;
 /// How far from its ends a piece is looked at, so that a jump there counts to one side.
 const MARGIN: f64 = 1e-6;
+/// From there it is gone on to the ends along the line through the next point.
+const ON: f64 = MARGIN / (0.25 - MARGIN);
 
 /// A rate over pieces of time, each nearly a straight line.
 #[derive(Debug, Clone, PartialEq)]
@@ -50,18 +52,15 @@ impl Look {
     fn new(from: f64, to: f64, n_parts: usize, rates: &mut dyn FnMut(f64, &mut [f64])) -> Self {
         let length = to - from;
         let at = [MARGIN, 0.25, 0.5, 0.75, 1.0 - MARGIN].map(|part| from + part * length);
-        let mut values = at.map(|t| {
+        let [mut a, b, c, d, mut e] = at.map(|t| {
             let mut values = vec![0.0; n_parts];
             rates(t, &mut values);
             values
         });
-        // On to the ends along straight lines.
-        const ON: f64 = MARGIN / (0.25 - MARGIN);
-        for k in 0..n_parts {
-            values[0][k] += ON * (values[0][k] - values[1][k]);
-            values[4][k] += ON * (values[4][k] - values[3][k]);
+        for (end, inner) in [(&mut a, &b), (&mut e, &d)] {
+            end.iter_mut().zip(inner).for_each(|(end, inner)| *end += ON * (*end - inner));
         }
-        Self { from, to, values }
+        Self { from, to, values: [a, b, c, d, e] }
     }
 
     fn sum(&self, point: usize) -> f64 {
