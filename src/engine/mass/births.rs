@@ -4,59 +4,96 @@
 //! nothing.
 
 use super::super::error::RunError;
+use super::super::parallel;
 use super::super::track::medium::Medium;
-use super::super::track::tracker::EARLIEST;
+use super::super::track::tracker::{EARLIEST, Steps};
 use super::book::{Event, What};
 use super::flock;
-use super::release::{Birth, Kind, Window};
+use super::release::{Birth, Kind, Release, Window};
 use super::run::Run;
+use crate::state::particles::BLOCK;
+
+/// Blocks that begin together.
+const BLOCKS_PER_ROUND: usize = 64;
 
 impl<const D: usize, M: Medium<D>> Run<'_, D, M> {
-    /// What is there at the start.
+    /// What is there at the start, a round of blocks at a time: a hundred million births are not held twice.
     pub fn start(&mut self) -> Result<(), RunError> {
-        let window = Window { step: 0, t: 0.0, dt: 1.0, period: 0, part: 1.0 };
-        let mut births = Vec::new();
-        for release in &self.releases {
-            if matches!(release.kind, Kind::Steady { from: 0.0, to: 0.0, .. }) {
-                release.births(&self.stream, window, &mut births);
+        for origin in 0..self.releases.len() {
+            let n = self.releases[origin].n_at_start();
+            let block = BLOCK as u64;
+            for round in (0..n).step_by(BLOCKS_PER_ROUND * BLOCK) {
+                let n_blocks = (n - round).div_ceil(block).min(BLOCKS_PER_ROUND as u64) as usize;
+                let (release, stream) = (&self.releases[origin], &self.stream);
+                let born = parallel::map(n_blocks, &|idx| {
+                    let first = round + idx as u64 * block;
+                    release.at_start(stream, first..(first + block).min(n))
+                });
+                for births in born {
+                    self.book_births(&births, 0.0, 0.0);
+                    for birth in births {
+                        flock::add(&mut self.flocks, birth.population, birth.id, birth.position);
+                    }
+                }
             }
-        }
-        self.book_births(&births, 0.0, 0.0);
-        for birth in births {
-            flock::add(&mut self.flocks, birth.population, birth.id, birth.position);
         }
         Ok(())
     }
 
-    pub fn book_births(&mut self, births: &[Birth<D>], t: f64, dt: f64) {
+    /// What begins within steps, by step.
+    pub fn births(&mut self, steps: Steps, part: f64) -> Vec<Vec<Birth<D>>> {
+        let Steps { first, end, t, dt } = steps;
+        let later: Vec<&Release<D>> =
+            self.releases.iter().filter(|release| release.n_at_start() == 0).collect();
+        if later.is_empty() {
+            return Vec::new();
+        }
+        let (stream, period) = (&self.stream, self.period);
+        let window = |step: u64| Window { step, t: t + (step - first) as f64 * dt, dt, period, part };
+        let born = parallel::map((end - first) as usize, &|idx| {
+            let mut births = Vec::new();
+            for release in &later {
+                release.births(stream, window(first + idx as u64), &mut births);
+            }
+            births
+        });
+        for (step, births) in (first..end).zip(&born) {
+            self.book_births(births, window(step).t, dt);
+        }
+        born
+    }
+
+    fn book_births(&mut self, births: &[Birth<D>], t: f64, dt: f64) {
+        let mut events = Vec::new();
         for birth in births {
-            let origin = flock::origin(birth.id);
-            let event = |what: What| Event {
-                what,
-                population: birth.population,
-                id: birth.id,
-                mass: self.units.of(birth.population, birth.id),
-                t: t + birth.entered.max(EARLIEST) * dt,
-            };
-            let mut events = vec![event(What::Entered { origin })];
-            let place = |axis: usize| birth.position[axis];
-            if let Kind::Held { axis, sign, .. } = self.releases[origin].kind {
-                // It has come from the side to where it is: planes on that way were crossed.
-                for (plane, of) in self.tracker.planes.iter().enumerate().filter(|(_, of)| of.axis == axis) {
-                    let is_in_part = of.part.as_ref().is_none_or(|part| part.holds(axis, place));
-                    if sign * (birth.position[axis] - of.at) > 0.0 && is_in_part {
-                        events.push(event(What::Crossed { plane, is_forward: sign > 0.0 }));
-                    }
-                }
-            }
-            let side = self.side_of(birth.id);
-            for (idx, gap) in self.tracker.gaps.iter().enumerate() {
-                if side == Some(gap.side) && gap.part.holds(gap.side / 2, place) {
-                    let plane = self.tracker.planes.len() + idx;
-                    events.push(event(What::Crossed { plane, is_forward: false }));
-                }
-            }
+            self.entry(birth, t + birth.entered.max(EARLIEST) * dt, &mut events);
             self.note(&events);
+            events.clear();
+        }
+    }
+
+    /// What happens with a birth.
+    fn entry(&self, birth: &Birth<D>, t: f64, events: &mut Vec<Event>) {
+        let origin = flock::origin(birth.id);
+        let mass = self.units.of(birth.population, birth.id);
+        let event = |what: What| Event { what, population: birth.population, id: birth.id, mass, t };
+        events.push(event(What::Entered { origin }));
+        let place = |axis: usize| birth.position[axis];
+        if let Kind::Held { axis, sign, .. } = self.releases[origin].kind {
+            // It has come from the side to where it is: planes on that way were crossed.
+            for (plane, of) in self.tracker.planes.iter().enumerate().filter(|(_, of)| of.axis == axis) {
+                let is_in_part = of.part.as_ref().is_none_or(|part| part.holds(axis, place));
+                if sign * (birth.position[axis] - of.at) > 0.0 && is_in_part {
+                    events.push(event(What::Crossed { plane, is_forward: sign > 0.0 }));
+                }
+            }
+        }
+        let side = self.side_of(birth.id);
+        for (idx, gap) in self.tracker.gaps.iter().enumerate() {
+            if side == Some(gap.side) && gap.part.holds(gap.side / 2, place) {
+                let plane = self.tracker.planes.len() + idx;
+                events.push(event(What::Crossed { plane, is_forward: false }));
+            }
         }
     }
 

@@ -13,7 +13,7 @@ use super::book::{Event, Log};
 use super::flock::{self, Flock};
 use super::release::Birth;
 use super::run::Run;
-use super::turn::{OnTurning, Pass, go_on_turning};
+use super::turn::{OnTurning, Pass};
 use super::units::Units;
 
 /// What came of a group of blocks.
@@ -60,7 +60,17 @@ impl<const D: usize, M: Medium<D>> Run<'_, D, M> {
                     }
                     None => {
                         let carrier = &carriers[flock.population];
-                        tracker.width.run(OnFlock { tracker, carrier, units, steps, flock, bench, found });
+                        let entered = None;
+                        tracker.width.run(OnFlock {
+                            tracker,
+                            carrier,
+                            units,
+                            steps,
+                            entered,
+                            flock,
+                            bench,
+                            found,
+                        });
                     }
                 },
             );
@@ -90,58 +100,90 @@ impl<const D: usize, M: Medium<D>> Run<'_, D, M> {
         }
     }
 
-    /// Takes what begins within a step to the end of the tile, and keeps it.
-    pub fn move_newborn(&mut self, mut births: Vec<Birth<D>>, steps: Steps) -> Result<(), RunError> {
-        births.sort_by_key(|birth| birth.population);
-        let mut rest = &births[..];
-        while let Some(first) = rest.first() {
-            let n = rest.iter().take(LANES).take_while(|birth| birth.population == first.population).count();
-            let (group, others) = rest.split_at(n);
-            rest = others;
-            self.move_group(group, steps)?;
+    /// Takes what begins within steps to the end of the last one, and keeps it: births by step.
+    pub fn move_newborn(&mut self, births: Vec<Vec<Birth<D>>>, steps: Steps) -> Result<(), RunError> {
+        let mut groups = Vec::new();
+        for (idx, mut births) in births.into_iter().enumerate() {
+            let steps =
+                Steps { first: steps.first + idx as u64, t: steps.t + idx as f64 * steps.dt, ..steps };
+            births.sort_by_key(|birth| birth.population);
+            for own in births.chunk_by(|one, other| one.population == other.population) {
+                groups.extend(own.chunks(LANES).map(|group| Group::new(group, steps)));
+            }
+        }
+        let run = &*self;
+        parallel::for_each(&mut groups, &|_, group| run.move_group(group));
+        for Group { flock, mut found, .. } in groups {
+            let moved = std::mem::take(&mut found.moved);
+            self.take(found)?;
+            for idx in 0..flock.len() {
+                flock::add(&mut self.flocks, flock.population, flock.ids[idx], flock.position(idx));
+            }
+            flock::spread(&mut self.flocks, moved);
         }
         Ok(())
     }
 
-    /// Takes up to 64 newborn particles of one population along.
-    fn move_group(&mut self, group: &[Birth<D>], steps: Steps) -> Result<(), RunError> {
-        let mut flock = Flock::new(group[0].population);
-        let turning = self.chain.as_ref().filter(|chain| chain.turns(flock.population));
-        let (mut entered, mut ages): (Lane, Lane) = ([0.0; LANES], [0.0; LANES]);
-        for (lane, birth) in group.iter().enumerate() {
-            flock.push(birth.id, birth.position);
-            entered[lane] = birth.entered;
-            if turning.is_some() {
-                ages[lane] =
-                    self.releases[flock::origin(birth.id)].age(&self.stream, birth, (steps.dt, self.period));
+    fn move_group(&self, group: &mut Group<D>) {
+        let Group { flock, births, entered, steps, found } = group;
+        let (tracker, units, steps) = (&self.tracker, &self.units, *steps);
+        let carrier = &self.carriers[flock.population];
+        match self.chain.as_ref().filter(|chain| chain.turns(flock.population)) {
+            Some(chain) => {
+                let mut ages: Lane = [0.0; LANES];
+                for (age, birth) in ages.iter_mut().zip(births.iter()) {
+                    let release = &self.releases[flock::origin(birth.id)];
+                    *age = release.age(&self.stream, birth, (steps.dt, self.period));
+                }
+                let company = Company { chain, carriers: &self.paces };
+                let newborn = Some(Newborn { entered, ages: &ages });
+                let pass = Pass { tracker, company, units, steps, newborn };
+                self.benches.lend(
+                    || Box::new(tracker.bench()),
+                    |bench| tracker.width.run(OnTurning { pass, flock, bench, found }),
+                );
             }
+            None if carrier.mobility > 0.0 => {
+                let entered = Some(&*entered);
+                self.benches.lend(
+                    || Box::new(tracker.bench()),
+                    |bench| {
+                        tracker.width.run(OnFlock {
+                            tracker,
+                            carrier,
+                            units,
+                            steps,
+                            entered,
+                            flock,
+                            bench,
+                            found,
+                        });
+                    },
+                );
+            }
+            None => {}
         }
-        let carrier = self.carriers[flock.population];
-        let mut found = Yield::default();
-        let (tracker, units) = (&self.tracker, &self.units);
-        if turning.is_some() || carrier.mobility > 0.0 {
-            self.benches.lend(
-                || Box::new(tracker.bench()),
-                |bench| match turning {
-                    Some(chain) => {
-                        let company = Company { chain, carriers: &self.paces };
-                        let newborn = Some(Newborn { entered: &entered, ages: &ages });
-                        let pass = Pass { tracker, company, units, steps, newborn };
-                        go_on_turning(&pass, &mut flock, bench, &mut found);
-                    }
-                    None => {
-                        go_on(tracker, &carrier, units, steps, Some(&entered), &mut flock, bench, &mut found);
-                    }
-                },
-            );
+    }
+}
+
+/// Up to 64 newborn particles of one population and step.
+struct Group<const D: usize> {
+    flock: Flock<D>,
+    births: Vec<Birth<D>>,
+    entered: Lane,
+    steps: Steps,
+    found: Yield<D>,
+}
+
+impl<const D: usize> Group<D> {
+    fn new(births: &[Birth<D>], steps: Steps) -> Self {
+        let mut flock = Flock::new(births[0].population);
+        let mut entered: Lane = [0.0; LANES];
+        for (entered, birth) in entered.iter_mut().zip(births) {
+            flock.push(birth.id, birth.position);
+            *entered = birth.entered;
         }
-        let moved = std::mem::take(&mut found.moved);
-        self.take(found)?;
-        for idx in 0..flock.len() {
-            flock::add(&mut self.flocks, flock.population, flock.ids[idx], flock.position(idx));
-        }
-        flock::spread(&mut self.flocks, moved);
-        Ok(())
+        Self { flock, births: births.to_vec(), entered, steps, found: Yield::default() }
     }
 }
 
@@ -151,6 +193,7 @@ struct OnFlock<'a, const D: usize, M: Medium<D>> {
     carrier: &'a Carrier,
     units: &'a Units,
     steps: Steps,
+    entered: Option<&'a Lane>,
     flock: &'a mut Flock<D>,
     bench: &'a mut Bench<D, M>,
     found: &'a mut Yield<D>,
@@ -161,7 +204,16 @@ impl<const D: usize, M: Medium<D>> pulp::NullaryFnOnce for OnFlock<'_, D, M> {
 
     #[inline(always)]
     fn call(self) {
-        go_on(self.tracker, self.carrier, self.units, self.steps, None, self.flock, self.bench, self.found);
+        go_on(
+            self.tracker,
+            self.carrier,
+            self.units,
+            self.steps,
+            self.entered,
+            self.flock,
+            self.bench,
+            self.found,
+        );
     }
 }
 

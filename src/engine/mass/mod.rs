@@ -21,6 +21,7 @@ pub(super) mod place;
 mod pores;
 pub(super) mod release;
 mod run;
+mod running;
 mod shape;
 mod sides;
 mod sources;

@@ -3,6 +3,7 @@
 //! Owns the map from a share of a mass to a place. May use `maths`. It deliberately draws nothing: shares and
 //! uniform numbers are given.
 
+use super::running::Running;
 use super::spots::Spots;
 use crate::maths::scalar::{cos, ln, sin};
 use std::sync::Arc;
@@ -51,14 +52,14 @@ pub struct Cells<const D: usize> {
     low: [f64; D],
     width: [f64; D],
     n: [usize; D],
-    cumulative: Vec<f64>,
+    masses: Running,
 }
 
 /// Rectangles of one side with a weight each.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Faces<const D: usize> {
     corners: Arc<[([f64; D], [f64; D])]>,
-    cumulative: Vec<f64>,
+    weights: Running,
 }
 
 /// Cells that an initial concentration is looked at in, in all.
@@ -71,7 +72,8 @@ impl<const D: usize> Cells<D> {
         let width: [f64; D] = std::array::from_fn(|axis| (high[axis] - low[axis]) / n[axis] as f64);
         let volume: f64 = width.iter().product();
         let n_cells: usize = n.iter().product();
-        let mut cells = Self { low, width, n, cumulative: Vec::with_capacity(n_cells) };
+        let mut cells = Self { low, width, n, masses: Running::new(Vec::new()) };
+        let mut sums = Vec::with_capacity(n_cells);
         // A million roundings would show in the total: what each of them loses is kept.
         let (mut sum, mut lost) = (0.0_f64, 0.0_f64);
         for first in (0..n_cells).step_by(4096) {
@@ -82,19 +84,20 @@ impl<const D: usize> Cells<D> {
                 let next = sum + term;
                 lost = (next - sum) - term;
                 sum = next;
-                cells.cumulative.push(sum);
+                sums.push(sum);
             }
         }
+        cells.masses = Running::new(sums);
         cells
     }
 
     pub fn total(&self) -> f64 {
-        self.cumulative.last().copied().unwrap_or(0.0)
+        self.masses.total()
     }
 
     /// The place that a share of the mass comes before.
     pub fn at(&self, share: f64, uniforms: &[f64; 8]) -> [f64; D] {
-        let (cell, part) = find(&self.cumulative, share * self.total());
+        let (cell, part) = self.masses.find(share * self.total());
         // Along one axis the share itself is the best draw; it is one of several otherwise.
         let fraction = std::array::from_fn(|axis| if D == 1 { part } else { uniforms[axis] });
         self.inside(cell, fraction)
@@ -102,8 +105,8 @@ impl<const D: usize> Cells<D> {
 
     /// The middle of each cell, with its mass.
     pub fn masses(&self) -> impl Iterator<Item = ([f64; D], f64)> + '_ {
-        let before = [0.0].into_iter().chain(self.cumulative.iter().copied());
-        let own = self.cumulative.iter().zip(before).map(|(sum, before)| sum - before);
+        let before = [0.0].into_iter().chain(self.masses.sums().iter().copied());
+        let own = self.masses.sums().iter().zip(before).map(|(sum, before)| sum - before);
         own.enumerate().map(|(cell, mass)| (self.inside(cell, [0.5; D]), mass))
     }
 
@@ -135,46 +138,27 @@ fn shape<const D: usize>(low: [f64; D], high: [f64; D]) -> [usize; D] {
     n
 }
 
-/// The first index whose cumulative sum is above a value, and the part of it that is below.
-pub(super) fn find(cumulative: &[f64], wanted: f64) -> (usize, f64) {
-    let idx = cumulative.partition_point(|&sum| sum <= wanted).min(cumulative.len().saturating_sub(1));
-    let before = if idx == 0 { 0.0 } else { cumulative[idx - 1] };
-    let own = cumulative[idx] - before;
-    (idx, if own > 0.0 { ((wanted - before) / own).clamp(0.0, 1.0) } else { 0.5 })
-}
-
 impl<const D: usize> Faces<D> {
     pub fn new(faces: Vec<([f64; D], [f64; D], f64)>) -> Self {
-        let mut sum = 0.0;
-        let mut next = |weight: f64| {
-            sum += weight;
-            sum
-        };
-        let cumulative = faces.iter().map(|face| next(face.2)).collect();
-        Self { corners: faces.into_iter().map(|(low, high, _)| (low, high)).collect(), cumulative }
+        let weights = Running::of(faces.iter().map(|face| face.2));
+        Self { corners: faces.into_iter().map(|(low, high, _)| (low, high)).collect(), weights }
     }
 
     /// The same rectangles with other weights, one list after another.
     pub fn in_time(corners: &[([f64; D], [f64; D])], weights: &[Vec<f64>]) -> Vec<Self> {
         let corners: Arc<[([f64; D], [f64; D])]> = corners.into();
-        let running = |weights: &Vec<f64>| {
-            let mut sum = 0.0;
-            let mut next = |weight: f64| {
-                sum += weight;
-                sum
-            };
-            weights.iter().map(|&weight| next(weight)).collect()
-        };
-        weights.iter().map(|own| Self { corners: corners.clone(), cumulative: running(own) }).collect()
+        let of =
+            |own: &Vec<f64>| Self { corners: corners.clone(), weights: Running::of(own.iter().copied()) };
+        weights.iter().map(of).collect()
     }
 
     pub fn total(&self) -> f64 {
-        self.cumulative.last().copied().unwrap_or(0.0)
+        self.weights.total()
     }
 
     /// A place by the weights.
     pub fn at(&self, uniforms: &[f64; 8]) -> [f64; D] {
-        let (face, _) = find(&self.cumulative, uniforms[3] * self.total());
+        let (face, _) = self.weights.find(uniforms[3] * self.total());
         let (low, high) = &self.corners[face];
         std::array::from_fn(|axis| low[axis] + uniforms[axis] * (high[axis] - low[axis]))
     }

@@ -9,6 +9,7 @@ use super::parts::Deep;
 use super::place::{Faces, Place};
 use crate::plan::tape::Tape;
 use crate::state::stream::Stream;
+use std::ops::Range;
 
 /// A particle that begins within a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -68,6 +69,26 @@ pub struct Window {
 }
 
 impl<const D: usize> Release<D> {
+    /// How many are there when the run begins.
+    pub fn n_at_start(&self) -> u64 {
+        match self.kind {
+            Kind::Steady { n, from: 0.0, to: 0.0, .. } => n,
+            _ => 0,
+        }
+    }
+
+    /// Some of those that are there when the run begins.
+    pub fn at_start(&self, stream: &Stream, counts: Range<u64>) -> Vec<Birth<D>> {
+        let Kind::Steady { n, sampling, .. } = self.kind else { return Vec::new() };
+        let born = |count: u64| {
+            let id = flock::id(self.origin, count);
+            let uniforms = stream.uniforms_of(id, 0);
+            let position = self.place.at(sampling.share(count, n, &uniforms), &uniforms);
+            Birth { id, population: self.population, position, entered: 0.0 }
+        };
+        counts.map(born).collect()
+    }
+
     /// Particles of the window, in the order of their numbers.
     pub fn births(&self, stream: &Stream, window: Window, births: &mut Vec<Birth<D>>) {
         match &self.kind {

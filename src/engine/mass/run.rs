@@ -21,7 +21,7 @@ use super::media::Media;
 use super::observe::Scene;
 use super::order::Order;
 use super::parts::Drafts;
-use super::release::{Birth, Kind, Release, Window};
+use super::release::{Kind, Release};
 use super::units::Units;
 use super::world::Site;
 use crate::chemistry::Work;
@@ -221,25 +221,10 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
 
     /// Takes everything through steps, or through a part of one.
     fn advance(&mut self, steps: Steps, part: f64) -> Result<(), RunError> {
-        let Steps { first, end, t, dt } = steps;
-        self.empty_boxes(t);
-        let mut newborn: Vec<Vec<Birth<D>>> = Vec::new();
-        for step in first..end {
-            let window = Window { step, t: t + (step - first) as f64 * dt, dt, period: self.period, part };
-            let mut births = Vec::new();
-            for release in &self.releases {
-                if !matches!(release.kind, Kind::Steady { from: 0.0, to: 0.0, .. }) {
-                    release.births(&self.stream, window, &mut births);
-                }
-            }
-            self.book_births(&births, window.t, dt);
-            newborn.push(births);
-        }
+        self.empty_boxes(steps.t);
+        let newborn = self.births(steps, part);
         self.move_flocks(steps)?;
-        for (step, births) in (first..end).zip(newborn) {
-            let t = t + (step - first) as f64 * dt;
-            self.move_newborn(births, Steps { first: step, end, t, dt })?;
-        }
+        self.move_newborn(newborn, steps)?;
         flock::gather(&mut self.flocks);
         Ok(())
     }

@@ -3,14 +3,14 @@
 //! Owns the map from a share of the mass to a place. May use the search beside it. It deliberately moves nothing: a
 //! particle begins exactly at a place.
 
-use super::place::find;
+use super::running::Running;
 use crate::data::Cloud;
 
 /// Places and the sums of their weights.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Spots<const D: usize> {
     places: Vec<[f64; D]>,
-    cumulative: Vec<f64>,
+    weights: Running,
 }
 
 impl<const D: usize> Spots<D> {
@@ -18,15 +18,14 @@ impl<const D: usize> Spots<D> {
         let at = |row: usize| {
             std::array::from_fn(|axis| cloud.coordinates().get(axis).map_or(0.0, |column| column[row]))
         };
-        Self { places: (0..cloud.n_rows()).map(at).collect(), cumulative: cloud.cumulative() }
+        Self { places: (0..cloud.n_rows()).map(at).collect(), weights: Running::new(cloud.cumulative()) }
     }
 
     /// The place of the particle before which this share of the mass comes. With shares at equal distances, as
     /// stratified ones are, a place of weight w out of W has `n w/W` of n particles, rounded up or down; where all
     /// weigh the same and n is their number, each has one.
     pub fn at(&self, share: f64) -> [f64; D] {
-        let total = self.cumulative.last().copied().unwrap_or(0.0);
-        let (row, _) = find(&self.cumulative, share * total);
+        let (row, _) = self.weights.find(share * self.weights.total());
         self.places.get(row).copied().unwrap_or([0.0; D])
     }
 }

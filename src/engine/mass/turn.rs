@@ -40,7 +40,7 @@ impl<const D: usize, M: Medium<D>> pulp::NullaryFnOnce for OnTurning<'_, D, M> {
 
 /// Takes a block through steps, 64 particles at a time; those that leave, or turn, are taken out.
 #[inline(always)]
-pub fn go_on_turning<const D: usize, M: Medium<D>>(
+fn go_on_turning<const D: usize, M: Medium<D>>(
     pass: &Pass<D, M>,
     flock: &mut Flock<D>,
     bench: &mut Bench<D, M>,
