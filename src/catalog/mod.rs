@@ -2,5 +2,6 @@
 //!
 //! Owns formulas, their arguments and their sources. May use the words only. It deliberately runs nothing.
 
+pub mod kernel;
 pub mod rate;
 pub mod reference;

@@ -53,6 +53,7 @@ pub struct Work {
     pub reacts: bool,
     pub moves: bool,
     pub bounds: bool,
+    pub exchanges: bool,
     pub averages: bool,
 }
 
@@ -184,10 +185,16 @@ impl<'a, const D: usize> Program<'a, D> {
             Stage::FusedReact => Work { mixes: relaxes, reacts, ..Work::default() },
             Stage::Move => Work { moves, ..Work::default() },
             Stage::Bound => Work { bounds: moves && !is_tracked, ..Work::default() },
+            Stage::Exchange => Work { exchanges: self.plan.exchange.is_some(), ..Work::default() },
             Stage::Average => Work { averages, ..Work::default() },
-            Stage::FusedStep => {
-                Work { mixes: relaxes, reacts: reacts && !is_coupled, moves, bounds: moves, averages }
-            }
+            Stage::FusedStep => Work {
+                mixes: relaxes,
+                reacts: reacts && !is_coupled,
+                moves,
+                bounds: moves,
+                averages,
+                exchanges: false,
+            },
             Stage::Observe => Work::default(),
         });
         works.filter(|work| *work != Work::default()).collect()

@@ -22,6 +22,7 @@ fn plan(axes: Vec<Axis>, outputs: Vec<Output>) -> Plan {
         species: vec![],
         components: vec![],
         mixing: None,
+        exchange: None,
         reactions: vec![],
         chemistry: None,
         transport: None,

@@ -12,6 +12,7 @@ impl Plan {
         self.check_fields()?;
         self.check_chemistry()?;
         self.check_mixing()?;
+        self.exchange.as_ref().map_or(Ok(()), |exchange| exchange.check(self.axes.len()))?;
         self.check_transport()?;
         self.outputs.iter().try_for_each(|output| self.check_output(output))
     }

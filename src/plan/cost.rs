@@ -17,6 +17,12 @@ mod table {
     pub(super) const BOUND: f64 = 0.5;
     /// Sum of one value and count of one particle.
     pub(super) const AVERAGE: f64 = 0.9;
+    /// One parcel put in the order of cells, and its values brought there and back.
+    pub(super) const SORT: f64 = 50.0;
+    /// One parcel among its neighbours, and one of them: weighed, and one of its values.
+    pub(super) const PARCEL: f64 = 40.0;
+    pub(super) const PAIR: f64 = 2.5;
+    pub(super) const PAIR_VALUE: f64 = 0.5;
     /// Relaxation of one stored value.
     pub(super) const MIX: f64 = 0.7;
     /// One reaction of a particle in closed form, with reading and writing it.
@@ -110,6 +116,7 @@ pub fn estimate(plan: &Plan, scales: Option<&TimeScales>) -> Cost {
             plan.transport.as_ref().map_or(move_cost * n_axes, |transport| track_cost(plan, transport))
         }
         Stage::Bound => table::BOUND * n_axes,
+        Stage::Exchange => exchange_cost(plan, n_values),
         Stage::Average => table::AVERAGE * n_values,
         Stage::FusedStep => {
             let step = move_cost * n_axes + table::BOUND * n_axes + table::AVERAGE * n_values;
@@ -138,6 +145,15 @@ pub fn estimate(plan: &Plan, scales: Option<&TimeScales>) -> Cost {
         stages,
         cpu_seconds: nanoseconds * 1e-9,
     }
+}
+
+/// Nanoseconds per particle and step of an exchange: neighbours are looked for and weighed twice in each sum.
+fn exchange_cost(plan: &Plan, n_values: f64) -> f64 {
+    let Some(exchange) = &plan.exchange else { return 0.0 };
+    let sizes = exchange.sizes(plan, plan.time.step);
+    let neighbours = sizes.neighbours.min(plan.particles.count as f64);
+    let sums = exchange.sums(sizes.share);
+    table::SORT + sums * (table::PARCEL + neighbours * (table::PAIR + table::PAIR_VALUE * n_values))
 }
 
 /// Nanoseconds per particle and step of a walk along tracks.

@@ -107,6 +107,7 @@ fn stage_words(stage: Stage) -> &'static str {
         Stage::Mix => "mix: relax towards the means of the bins",
         Stage::Move => "move: drift and dispersion",
         Stage::Bound => "bound: apply the sides of the domain",
+        Stage::Exchange => "exchange: parcels and those around them exchange what they carry",
         Stage::Average => "average: sums and means per bin",
         Stage::FusedReact => "mix and react in one pass over memory",
         Stage::FusedStep => "mix, move, bound and average in one pass over memory",

@@ -51,6 +51,7 @@ pub fn lower(scenario: &Scenario) -> Result<Lowered, Vec<Diagnostic>> {
         species,
         components,
         mixing: scenario.mixing.as_ref().map(lower_mixing),
+        exchange: None,
         reactions: scenario.reactions.iter().filter_map(lower_reaction).collect(),
         chemistry,
         transport,

@@ -16,6 +16,7 @@ pub mod document;
 mod edges;
 pub mod eliminate;
 pub mod evaluation;
+pub mod exchange;
 pub mod explain;
 mod explain_reactions;
 mod explain_transport;
@@ -44,6 +45,7 @@ pub use crate::scenario::{OutputKind, Placement, Side, Station};
 pub use compile::{Compiled, Options, Selection, compile, hash};
 
 use chemistry::Chemistry;
+use exchange::Exchange;
 use serde::{Deserialize, Serialize};
 use tape::Tape;
 use transport::Transport;
@@ -65,6 +67,9 @@ pub struct Plan {
     /// The conservative fields that every particle carries; each in every stored zone.
     pub components: Vec<Component>,
     pub mixing: Option<Mixing>,
+    /// What parcels exchange with those around them; absent where they do not.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub exchange: Option<Exchange>,
     pub reactions: Vec<InstantReaction>,
     /// Reactions at finite rates and in equilibrium; absent where there are none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -296,6 +301,8 @@ pub enum Stage {
     Move,
     /// Apply the sides of the domain.
     Bound,
+    /// Parcels exchange with those around them at the positions reached.
+    Exchange,
     /// Bin index of every particle, sums per bin, means.
     Average,
     /// Mix and React in one pass over memory, both of the step before.

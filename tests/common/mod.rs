@@ -36,6 +36,7 @@ pub fn plan() -> Plan {
         species: vec![species("A", true), species("B", true), species("biomass", false)],
         components: Vec::new(),
         mixing: None,
+        exchange: None,
         reactions: Vec::new(),
         chemistry: None,
         transport: None,

@@ -112,6 +112,7 @@ impl Network {
             species: self.species.clone(),
             components: (0..self.n_components).map(component).collect(),
             mixing: None,
+            exchange: None,
             reactions: vec![],
             chemistry: Some(chemistry),
             ..support::front(10, 1, 1.0, 1.0)

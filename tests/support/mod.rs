@@ -113,6 +113,7 @@ pub fn plain(axes: Vec<Axis>, walk: Walk, n_particles: u64, duration: f64, step:
         species: vec![species("A", 0.0, vec![(0, 1.0)])],
         components: vec![Component { name: "A".to_owned(), initial: constant(1.0), is_immobile: false }],
         mixing: None,
+        exchange: None,
         reactions: vec![],
         chemistry: None,
         transport: None,

@@ -45,8 +45,11 @@ pub(super) fn run(draft: &mut Draft) {
         let why = "first-order with constant rates: transport and reaction commute, exact for any step";
         notes.push(("reaction in a step", why));
     }
-    notes.push(("neighbour search", "no kernel interaction"));
+    if plan.exchange.is_none() {
+        notes.push(("neighbour search", "no kernel interaction"));
+    }
     let mut stages = match (moves, mixes) {
+        _ if plan.exchange.is_some() => with_exchange(plan, is_coupled),
         // Parcels that come and go are no pass over memory: each stage has its own.
         _ if is_tracked && is_coupled => vec![Stage::FusedReact, Stage::Move, Stage::Average],
         _ if is_tracked && reacts => vec![Stage::React, Stage::Move],
@@ -68,6 +71,29 @@ pub(super) fn run(draft: &mut Draft) {
     for (what, why) in notes {
         draft.leave_out(what, why);
     }
+}
+
+/// Parcels know their neighbours only when all have moved: nothing is joined with what comes after.
+fn with_exchange(plan: &Plan, is_coupled: bool) -> Vec<Stage> {
+    let (mixes, reacts) = (exchanges(plan), plan.reacts_in_steps());
+    let mut stages = match (mixes, reacts) {
+        (true, true) => vec![Stage::FusedReact],
+        _ if is_coupled => vec![Stage::FusedReact],
+        (true, false) => vec![Stage::Mix],
+        (false, true) => vec![Stage::React],
+        (false, false) => vec![],
+    };
+    if plan.moves() {
+        stages.push(Stage::Move);
+    }
+    if plan.moves() && plan.transport.is_none() {
+        stages.push(Stage::Bound);
+    }
+    stages.push(Stage::Exchange);
+    if mixes || is_coupled {
+        stages.push(Stage::Average);
+    }
+    stages
 }
 
 /// Whether any zone moves towards the mean at a finite rate.

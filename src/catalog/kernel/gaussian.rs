@@ -1,0 +1,30 @@
+//! The normal distribution.
+
+use super::{Item, Radial};
+use crate::maths::vector::exp;
+
+#[derive(Debug, Clone, Copy)]
+pub struct Gaussian;
+
+impl Radial for Gaussian {
+    #[inline(always)]
+    fn value(self, q2: f64) -> f64 {
+        exp(-0.5 * q2)
+    }
+
+    /// It is its own: `−W′/q = W`.
+    #[inline(always)]
+    fn force(self, q2: f64) -> f64 {
+        self.value(q2)
+    }
+}
+
+pub const ITEM: Item = Item {
+    name: "gaussian",
+    support: f64::INFINITY,
+    value: |q2| Gaussian.value(q2),
+    force: |q2| Gaussian.force(q2),
+    equation: "exp(-q^2/2)",
+    source: "D. A. Benson, D. Bolster, 2016: Water Resour. Res. 52, 9190, doi:10.1002/2016WR019368 (collocation of two \
+             particles)",
+};
