@@ -25,7 +25,7 @@ impl<const D: usize> Run<'_, D> {
         if self.water.is_some() {
             return self.flow_ahead(due).map(Some);
         }
-        if self.reactions.reactor.is_none() {
+        if self.reactions.reactor.is_none() && self.exchange.is_none() {
             return Ok(None);
         }
         let plan_step = step_length(&self.program.plan.time, due.steps);
@@ -42,6 +42,7 @@ impl<const D: usize> Run<'_, D> {
             between.carry(program, &draws, block);
         });
         ahead.is_averaged = false;
+        ahead.exchange(due.steps, due.fraction * plan_step)?;
         if program.is_coupled() {
             let still = program.mover.leap(0.0, 0.0);
             ahead.pass(Work { averages: true, ..Work::default() }, due.steps, still, &[])?;
@@ -72,6 +73,7 @@ impl<const D: usize> Run<'_, D> {
         }
         let first = due.steps + ASIDE;
         ahead.flow_on(Steps { first, end: first + 1, t, dt })?;
+        ahead.exchange(due.steps, dt)?;
         let relaxes = ahead.relaxes();
         if relaxes || ahead.program.is_coupled() {
             let still = ahead.program.mover.leap(0.0, 0.0);

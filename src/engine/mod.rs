@@ -11,6 +11,7 @@ mod clock;
 mod conserved;
 mod control;
 mod error;
+mod exchange;
 mod initial;
 mod mass;
 mod mix;

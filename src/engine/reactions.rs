@@ -289,7 +289,8 @@ impl<const D: usize> Run<'_, D> {
         if let Some(recipes) = self.reactions.observed.as_ref().and_then(|observed| observed.recipes(t)) {
             self.program.species = recipes;
         }
-        if self.reactions.reactor.is_some() { self.settle_pending(steps.saturating_sub(1)) } else { Ok(()) }
+        let takes_copies = self.reactions.reactor.is_some() || self.exchange.is_some();
+        if takes_copies { self.settle_pending(steps.saturating_sub(1)) } else { Ok(()) }
     }
 
     /// Does what the step before has left to do.

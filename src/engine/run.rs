@@ -10,6 +10,7 @@ use super::clock::Clock;
 use super::conserved;
 use super::control::{Control, Settings};
 use super::error::RunError;
+use super::exchange::Exchange;
 use super::mass::gate::Gates;
 use super::observe::{self, Instant, Lab};
 use super::parallel::{self, Pool};
@@ -64,6 +65,8 @@ pub struct Run<'a, const D: usize> {
     /// Outputs of what passes places.
     pub gates: Gates,
     pub quanta: Quanta,
+    /// What parcels exchange with those around them.
+    pub exchange: Option<Exchange<D>>,
 }
 
 /// Sums and the first trouble of consecutive blocks.
@@ -153,6 +156,7 @@ impl<'a, const D: usize> Run<'a, D> {
         let n_groups = blocks.len().div_ceil(blocks_per_group);
         let groups = (0..n_groups).map(|_| Group::default()).collect();
         Ok(Self {
+            exchange: Exchange::new(&program)?,
             width,
             walk: Stream::new(plan.seed, Purpose::Walk),
             bridge: Stream::new(plan.seed, Purpose::Bridge),
@@ -197,6 +201,7 @@ impl<'a, const D: usize> Run<'a, D> {
             water: self.water.as_ref().map(Water::copy),
             gates: Gates::default(),
             quanta: self.quanta,
+            exchange: self.exchange.as_ref().map(Exchange::copy),
         }
     }
 
@@ -221,6 +226,10 @@ impl<'a, const D: usize> Run<'a, D> {
             if work.moves && self.water.is_some() {
                 let t = step as f64 * self.program.plan.time.step;
                 self.flow_on(Steps { first: step, end: step + 1, t, dt })?;
+                continue;
+            }
+            if work.exchanges {
+                self.exchange(step, dt)?;
                 continue;
             }
             if work.reacts && self.program.is_coupled() {

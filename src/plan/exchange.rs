@@ -157,7 +157,7 @@ impl Exchange {
     }
 
     /// Whether it is well-formed for so many axes.
-    pub(super) fn check(&self, d: usize) -> Result<(), String> {
+    pub fn check(&self, d: usize) -> Result<(), String> {
         check_operations(&self.bandwidth.operations, 2)?;
         require(self.diffusion.len() == d * (d + 1) / 2, || {
             "the exchange has no dispersion for each axis".into()

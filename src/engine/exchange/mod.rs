@@ -1,0 +1,124 @@
+//! Exchange between parcels of water and those around them.
+//!
+//! Owns one step of it. May use blocks, kernels and `parallel`. It deliberately moves nothing: places stay as they are.
+
+mod crowd;
+mod in_run;
+mod integrate;
+mod near;
+mod operator;
+mod space;
+mod table;
+
+use super::error::RunError;
+use super::parallel::Pool;
+use super::program::{Program, Role, unsound};
+use crate::maths::wide::Width;
+use crate::plan::exchange::{Exchange as Planned, Sizes};
+use crate::state::particles::Block;
+use crowd::{MOST_BLOCKS, Sorted};
+use near::Near;
+use operator::{Operator, Profile};
+use space::Space;
+
+/// What lives as long as the run.
+pub struct Exchange<const D: usize> {
+    planned: Planned,
+    sizes: Sizes,
+    space: Space<D>,
+    profile: Profile,
+    sorted: Sorted,
+    columns: Vec<Vec<f64>>,
+    lists: Pool<Near>,
+}
+
+/// A value that is wrong after an exchange.
+pub struct Wrong {
+    pub column: usize,
+    pub block: usize,
+    pub at: usize,
+}
+
+impl<const D: usize> Exchange<D> {
+    pub fn new(program: &Program<D>) -> Result<Option<Self>, RunError> {
+        let plan = program.plan;
+        let Some(planned) = &plan.exchange else { return Ok(None) };
+        planned.check(D).map_err(|reason| unsound(&reason))?;
+        let dt = plan.time.step.min(plan.time.duration);
+        let sizes = planned.sizes(plan, dt);
+        let size = (sizes.bandwidth, sizes.radius);
+        let space = Space::new(&plan.axes, &planned.diffusion, size, plan.particles.count)
+            .filter(|_| sizes.share.is_finite() && sizes.bandwidth > 0.0)
+            .ok_or_else(|| unsound("an exchange without dispersion or bandwidth"))?;
+        let profile =
+            Profile::new(planned).ok_or_else(|| unsound("an exchange by a kernel that does not exist"))?;
+        Ok(Some(Self {
+            planned: planned.clone(),
+            sizes,
+            space,
+            profile,
+            sorted: Sorted::default(),
+            columns: Vec::new(),
+            lists: Pool::new(),
+        }))
+    }
+
+    /// The same, to go another way from here.
+    pub fn copy(&self) -> Self {
+        Self {
+            planned: self.planned.clone(),
+            sizes: self.sizes,
+            space: self.space.clone(),
+            profile: self.profile.clone(),
+            sorted: Sorted::default(),
+            columns: Vec::new(),
+            lists: Pool::new(),
+        }
+    }
+
+    /// Everything that parcels carry is exchanged over `dt`; the first value that is below its limit afterwards, or no
+    /// number, is handed back.
+    pub fn step(
+        &mut self,
+        program: &Program<D>,
+        blocks: &mut [Block<D>],
+        (dt, width): (f64, Width),
+        limits: &[f64],
+    ) -> Result<Option<Wrong>, RunError> {
+        if blocks.len() >= MOST_BLOCKS {
+            return Err(unsound("an exchange of more than four thousand million parcels"));
+        }
+        let n_slots = program.roles.len();
+        // What is a mean is made anew, not exchanged.
+        let is_exchanged = |column: &usize| !matches!(program.roles[column % n_slots], Role::Mean);
+        let carried: Vec<usize> = (0..program.n_columns()).filter(is_exchanged).collect();
+        if carried.is_empty() {
+            return Ok(None);
+        }
+        self.sorted.sort(&self.space, blocks);
+        self.columns.resize_with(carried.len(), Vec::new);
+        for (values, &column) in self.columns.iter_mut().zip(&carried) {
+            self.sorted.gather(blocks, column, values);
+        }
+        let crowd = self.sorted.crowd(&self.space);
+        let normalisation = self.planned.normalisation;
+        let mut operator = Operator::new(crowd, &self.profile, normalisation, width, &self.lists);
+        let beta = self.beta(dt);
+        integrate::step(&mut operator, self.planned.integration, beta, &mut self.columns);
+        let mut wrong = None;
+        for (values, &column) in self.columns.iter().zip(&carried) {
+            let found = self.sorted.give_back(blocks, column, values, limits[column / n_slots]);
+            if let Some((block, at)) = found.filter(|_| wrong.is_none()) {
+                wrong = Some(Wrong { column, block, at });
+            }
+        }
+        Ok(wrong)
+    }
+
+    /// What the normalised sum of exchange forces is multiplied by in `dt`.
+    fn beta(&self, dt: f64) -> f64 {
+        let Sizes { diffusion, bandwidth, fidelity, .. } = self.sizes;
+        let given_back = if self.planned.is_compensated { 1.0 / fidelity } else { 1.0 };
+        2.0 * diffusion * dt / (bandwidth * bandwidth) * given_back
+    }
+}
