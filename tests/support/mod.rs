@@ -72,6 +72,7 @@ pub fn front(n_particles: u64, bins: usize, duration: f64, step: f64) -> Plan {
         ],
         components: vec![Component { name: "A".to_owned(), initial: step_down(0), is_immobile: false }],
         mixing: dual_rate(0.5, CHI),
+        exchange: None,
         reactions: vec![InstantReaction {
             name: "complexation".to_owned(),
             reactants: vec![(0, 1.0), (1, 1.0)],
@@ -113,7 +114,6 @@ pub fn plain(axes: Vec<Axis>, walk: Walk, n_particles: u64, duration: f64, step:
         species: vec![species("A", 0.0, vec![(0, 1.0)])],
         components: vec![Component { name: "A".to_owned(), initial: constant(1.0), is_immobile: false }],
         mixing: None,
-        exchange: None,
         reactions: vec![],
         chemistry: None,
         transport: None,
