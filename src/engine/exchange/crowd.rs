@@ -4,7 +4,7 @@
 //! stay what they were.
 
 use super::super::parallel;
-use super::near::Crowd;
+use super::near::{Crowd, PADDING};
 use super::space::Space;
 use crate::state::particles::{BLOCK, Block};
 
@@ -31,7 +31,7 @@ impl Sorted {
         for (axis, own) in y.iter_mut().zip(&self.y) {
             *axis = own;
         }
-        Crowd { space, y, first: &self.first }
+        Crowd { space, n: self.places.len(), y, first: &self.first }
     }
 
     /// Sorts all parcels anew: by cell, and within a cell by number.
@@ -72,7 +72,7 @@ impl Sorted {
 
     fn place<const D: usize>(&mut self, space: &Space<D>, blocks: &[Block<D>]) {
         self.y.resize_with(D, Vec::new);
-        self.y.iter_mut().for_each(|axis| axis.resize(self.places.len(), 0.0));
+        self.y.iter_mut().for_each(|axis| axis.resize(self.places.len() + PADDING, 0.0));
         let mut parts: Vec<(&[u32], Vec<&mut [f64]>)> =
             self.places.chunks(BLOCK).map(|part| (part, vec![])).collect();
         for axis in &mut self.y {
@@ -91,7 +91,7 @@ impl Sorted {
 
     /// A column of all parcels, in the order of cells.
     pub fn gather<const D: usize>(&self, blocks: &[Block<D>], column: usize, target: &mut Vec<f64>) {
-        target.resize(self.places.len(), 0.0);
+        target.resize(self.places.len() + PADDING, 0.0);
         let mut parts: Vec<_> = self.places.chunks(BLOCK).zip(target.chunks_mut(BLOCK)).collect();
         parallel::for_each(&mut parts, &|_, (places, target)| {
             for (value, &place) in target.iter_mut().zip(*places) {

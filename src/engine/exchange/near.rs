@@ -11,10 +11,17 @@ use crate::catalog::kernel::Radial;
 /// Lanes of a sum: the same for wide and narrow code.
 const LANES: usize = 8;
 
+/// Numbers that are read or written together: rows are taken in whole pieces, beyond their ends.
+const PIECE: usize = 4;
+
+/// What every array of a crowd is longer than it, so that whole pieces can be read.
+pub const PADDING: usize = PIECE;
+
 /// Parcels in the order of cells.
 #[derive(Clone, Copy)]
 pub struct Crowd<'a, const D: usize> {
     pub space: &'a Space<D>,
+    pub n: usize,
     /// Positions in the space, by axis.
     pub y: [&'a [f64]; D],
     /// Where each cell begins; one more than cells.
@@ -24,14 +31,16 @@ pub struct Crowd<'a, const D: usize> {
 /// Squared distances of what is near, later weights, row by row of cells.
 #[derive(Debug, Default)]
 pub struct Near {
-    pub weights: Vec<f64>,
+    weights: Vec<f64>,
+    /// Something else of the same parcels.
+    others: Vec<f64>,
     /// Where a row stands among all parcels, and how many it has.
-    pub rows: Vec<(usize, usize)>,
+    rows: Vec<(usize, usize)>,
     n: usize,
     /// `n`, and what is missing in the last lanes.
     end: usize,
     /// Where the parcel itself stands.
-    pub own: usize,
+    own: usize,
 }
 
 impl Near {
@@ -61,9 +70,7 @@ impl Near {
         }
         // The rest of the last lanes is out of reach.
         self.end = self.n.next_multiple_of(LANES);
-        if self.weights.len() < self.end {
-            self.weights.resize(self.end, 0.0);
-        }
+        self.make_room(0);
         self.weights[self.n..self.end].fill(f64::MAX);
     }
 
@@ -71,32 +78,25 @@ impl Near {
     #[inline(always)]
     fn look<const D: usize>(&mut self, crowd: &Crowd<D>, y: [f64; D]) {
         let space = crowd.space;
-        let radius = space.rest(0.0);
+        let radius = space.reach();
         match D {
             1 => self.row(crowd, y, 0, radius),
             2 => {
                 let last = space.along(0, y[0] + radius);
                 for row in space.along(0, y[0] - radius)..=last {
                     let d = space.distance(0, row, y[0]);
-                    if d <= radius {
-                        self.row(crowd, y, row, space.rest(d * d));
-                    }
+                    self.row(crowd, y, row, space.rest(d * d));
                 }
             }
             _ => {
                 let last = space.along(0, y[0] + radius);
                 for plane in space.along(0, y[0] - radius)..=last {
                     let d = space.distance(0, plane, y[0]);
-                    if d > radius {
-                        continue;
-                    }
                     let across = space.rest(d * d);
                     let (first, last) = (space.along(1, y[1] - across), space.along(1, y[1] + across));
                     for row in first..=last {
                         let e = space.distance(1, row, y[1]);
-                        if e <= across {
-                            self.row(crowd, y, space.row(plane, row), space.rest(d * d + e * e));
-                        }
+                        self.row(crowd, y, space.row(plane, row), space.rest(d * d + e * e));
                     }
                 }
             }
@@ -115,24 +115,58 @@ impl Near {
             return;
         }
         self.rows.push((start, n));
-        let needed = self.n + n + LANES;
-        if self.weights.len() < needed {
-            self.weights.resize(needed.next_power_of_two(), 0.0);
-        }
-        let target = &mut self.weights[self.n..self.n + n];
-        let mut columns = crowd.y;
+        self.make_room(n);
+        let whole = n.next_multiple_of(PIECE);
+        let (target, _) = self.weights[self.n..self.n + whole].as_chunks_mut::<PIECE>();
+        let mut columns = [&[][..]; D];
         for axis in 0..D {
-            columns[axis] = &crowd.y[axis][start..end];
+            columns[axis] = crowd.y[axis][start..start + whole].as_chunks::<PIECE>().0;
         }
-        for idx in 0..n {
-            let mut square = 0.0;
+        for piece in 0..target.len() {
+            let mut squares = [0.0; PIECE];
             for axis in 0..D {
-                let d = columns[axis][idx] - y[axis];
-                square += d * d;
+                let column = &columns[axis][piece];
+                for k in 0..PIECE {
+                    let d = column[k] - y[axis];
+                    squares[k] += d * d;
+                }
             }
-            target[idx] = square;
+            target[piece] = squares;
         }
         self.n += n;
+    }
+
+    /// Room for `n` more, whole pieces and lanes.
+    #[inline(always)]
+    fn make_room(&mut self, n: usize) {
+        if self.weights.len() < self.n + n + LANES {
+            self.grow(n);
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn grow(&mut self, n: usize) {
+        let len = (self.n + n + LANES).next_power_of_two();
+        self.weights.resize(len, 0.0);
+        self.others.resize(len, 0.0);
+    }
+
+    /// Brings what an array has for the same parcels together.
+    #[inline(always)]
+    fn fetch(&mut self, source: &[f64]) {
+        let mut at = 0;
+        for row in 0..self.rows.len() {
+            let (start, n) = self.rows[row];
+            let whole = n.next_multiple_of(PIECE);
+            let (target, _) = self.others[at..at + whole].as_chunks_mut::<PIECE>();
+            let (pieces, _) = source[start..start + whole].as_chunks::<PIECE>();
+            for piece in 0..target.len().min(pieces.len()) {
+                target[piece] = pieces[piece];
+            }
+            at += n;
+        }
+        self.others[self.n..self.end].fill(1.0);
     }
 
     /// Squared distances become values of a kernel.
@@ -156,39 +190,30 @@ impl Near {
     /// `w_ij ← 2 w_ij / (ρ_i + ρ_j)`
     #[inline(always)]
     pub fn divide_by_mean(&mut self, densities: &[f64], own: f64) {
-        let mut at = 0;
-        for &(start, n) in &self.rows {
-            let (weights, others) = (&mut self.weights[at..at + n], &densities[start..start + n]);
-            for idx in 0..n {
-                weights[idx] *= 2.0 / (own + others[idx]);
-            }
-            at += n;
+        self.fetch(densities);
+        let (weights, others) = (&mut self.weights[..self.end], &self.others[..self.end]);
+        for idx in 0..weights.len() {
+            weights[idx] *= 2.0 / (own + others[idx]);
         }
     }
 
     /// `w_ij ← w_ij s_i s_j`
     #[inline(always)]
     pub fn multiply(&mut self, factors: &[f64], own: f64) {
-        let mut at = 0;
-        for &(start, n) in &self.rows {
-            let (weights, others) = (&mut self.weights[at..at + n], &factors[start..start + n]);
-            for idx in 0..n {
-                weights[idx] *= own * others[idx];
-            }
-            at += n;
+        self.fetch(factors);
+        let (weights, others) = (&mut self.weights[..self.end], &self.others[..self.end]);
+        for idx in 0..weights.len() {
+            weights[idx] *= own * others[idx];
         }
     }
 
     /// `w_ij ← w_ij min(a_i, a_j)`
     #[inline(always)]
     pub fn limit(&mut self, caps: &[f64], own: f64) {
-        let mut at = 0;
-        for &(start, n) in &self.rows {
-            let (weights, others) = (&mut self.weights[at..at + n], &caps[start..start + n]);
-            for idx in 0..n {
-                weights[idx] *= if others[idx] < own { others[idx] } else { own };
-            }
-            at += n;
+        self.fetch(caps);
+        let (weights, others) = (&mut self.weights[..self.end], &self.others[..self.end]);
+        for idx in 0..weights.len() {
+            weights[idx] *= if others[idx] < own { others[idx] } else { own };
         }
     }
 
@@ -196,53 +221,41 @@ impl Near {
     #[inline(always)]
     pub fn sum(&self) -> f64 {
         let mut lanes = [0.0; LANES];
-        let (chunks, _) = self.weights[..self.end].as_chunks::<LANES>();
-        for chunk in chunks {
+        let (pieces, _) = self.weights[..self.end].as_chunks::<LANES>();
+        for piece in pieces {
             for lane in 0..LANES {
-                lanes[lane] += chunk[lane];
+                lanes[lane] += piece[lane];
             }
         }
         folded(lanes)
     }
 
+    /// Sum of the weights of all others.
+    #[inline(always)]
+    pub fn sum_of_others(&self) -> f64 {
+        self.sum() - self.weights[self.own]
+    }
+
     /// Sum of weights times factors.
     #[inline(always)]
-    pub fn sum_of(&self, factors: &[f64]) -> f64 {
-        let mut lanes = [0.0; LANES];
-        let mut at = 0;
-        for &(start, n) in &self.rows {
-            add(&mut lanes, &self.weights[at..at + n], &factors[start..start + n], 0.0);
-            at += n;
-        }
-        folded(lanes)
+    pub fn sum_of(&mut self, factors: &[f64]) -> f64 {
+        self.difference(factors, 0.0)
     }
 
     /// `Σ_j w_ij (v_j − v_i)`
     #[inline(always)]
-    pub fn difference(&self, values: &[f64], own: f64) -> f64 {
+    pub fn difference(&mut self, values: &[f64], own: f64) -> f64 {
+        self.fetch(values);
         let mut lanes = [0.0; LANES];
-        let mut at = 0;
-        for &(start, n) in &self.rows {
-            add(&mut lanes, &self.weights[at..at + n], &values[start..start + n], own);
-            at += n;
+        let (weights, _) = self.weights[..self.end].as_chunks::<LANES>();
+        let (others, _) = self.others[..self.end].as_chunks::<LANES>();
+        for piece in 0..weights.len().min(others.len()) {
+            let (weights, others) = (&weights[piece], &others[piece]);
+            for lane in 0..LANES {
+                lanes[lane] += weights[lane] * (others[lane] - own);
+            }
         }
         folded(lanes)
-    }
-}
-
-/// Adds `weights · (values − own)`, each to the lane of its place in the row.
-#[inline(always)]
-fn add(lanes: &mut [f64; LANES], weights: &[f64], values: &[f64], own: f64) {
-    let (weight_chunks, weight_rest) = weights.as_chunks::<LANES>();
-    let (value_chunks, value_rest) = values.as_chunks::<LANES>();
-    for idx in 0..weight_chunks.len().min(value_chunks.len()) {
-        let (weights, values) = (&weight_chunks[idx], &value_chunks[idx]);
-        for lane in 0..LANES {
-            lanes[lane] += weights[lane] * (values[lane] - own);
-        }
-    }
-    for lane in 0..weight_rest.len().min(value_rest.len()) {
-        lanes[lane] += weight_rest[lane] * (value_rest[lane] - own);
     }
 }
 

@@ -5,7 +5,7 @@
 #![allow(clippy::needless_range_loop)] // Zipped iterators are not always inlined; these loops are hot.
 
 use super::super::parallel::{self, Pool};
-use super::near::{Crowd, Near};
+use super::near::{Crowd, Near, PADDING};
 use super::table::Tabulated;
 use crate::catalog::kernel::{
     CubicSpline, Epanechnikov, Gaussian, QuinticSpline, Radial, WendlandC2, WendlandC4, WendlandC6,
@@ -92,8 +92,7 @@ impl<'a, const D: usize> Operator<'a, D> {
     ) -> Self {
         let mut own =
             Self { crowd, profile, normalisation, width, lists, factors: Vec::new(), caps: Vec::new() };
-        let n = crowd.y[0].len();
-        let mut densities = vec![0.0; n];
+        let mut densities = vec![0.0; crowd.n + PADDING];
         own.pass(Wanted::Densities, &mut [&mut densities]);
         match normalisation {
             Normalisation::Arithmetic => {}
@@ -113,7 +112,7 @@ impl<'a, const D: usize> Operator<'a, D> {
         for _ in 0..MOST_ROUNDS {
             self.pass(Wanted::Weighted(u), &mut [&mut sums]);
             let mut worst: f64 = 0.0;
-            for (u, sum) in u.iter_mut().zip(&sums) {
+            for (u, sum) in u.iter_mut().zip(&sums).take(self.crowd.n) {
                 worst = worst.max((*u * sum - 1.0).abs());
                 *u = (*u / sum).sqrt();
             }
@@ -143,10 +142,10 @@ impl<'a, const D: usize> Operator<'a, D> {
     }
 
     fn pass_with<K: Radial + Sync>(&self, kernel: K, wanted: Wanted, targets: &mut [&mut [f64]]) {
-        let n = self.crowd.y[0].len();
+        let n = self.crowd.n;
         let mut portions: Vec<Vec<&mut [f64]>> = (0..n.div_ceil(PORTION)).map(|_| Vec::new()).collect();
         for target in targets {
-            portions.iter_mut().zip(target.chunks_mut(PORTION)).for_each(|(own, part)| own.push(part));
+            portions.iter_mut().zip(target[..n].chunks_mut(PORTION)).for_each(|(own, part)| own.push(part));
         }
         parallel::for_each(&mut portions, &|idx, targets| {
             self.lists.lend(
@@ -198,7 +197,7 @@ impl<const D: usize, K: Radial> pulp::NullaryFnOnce for OnPortion<'_, '_, D, K> 
                         targets[column][at] = near.difference(values, values[idx]);
                     }
                     if targets.len() > columns.len() {
-                        targets[columns.len()][at] = near.sum() - near.weights[near.own];
+                        targets[columns.len()][at] = near.sum_of_others();
                     }
                 }
             }

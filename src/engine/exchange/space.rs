@@ -13,6 +13,10 @@ const ALONG: f64 = 8.0;
 /// Added to ranges, over the radius: rounding must not cut off what is just within it.
 const SLACK: f64 = 1e-9;
 
+/// Added to a number of moderate size it leaves the nearest whole number in the low bits.
+const SHIFT: f64 = 4_503_599_627_370_496.0;
+const LOW_BITS: u64 = (1 << 32) - 1;
+
 /// A copy of all particles beyond a side: `y ← sign · y + shift`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Image<const D: usize> {
@@ -31,6 +35,11 @@ pub struct Space<const D: usize> {
     inverse_edge: [f64; D],
     edge: [f64; D],
     cells: [usize; D],
+    /// Number of the last cell.
+    last: [f64; D],
+    reach: f64,
+    reach_square: f64,
+    slack: f64,
     /// Without the particles themselves.
     images: Vec<Image<D>>,
 }
@@ -58,6 +67,10 @@ impl<const D: usize> Space<D> {
             inverse_edge: [1.0; D],
             edge: [1.0; D],
             cells: [1; D],
+            last: [0.0; D],
+            reach: radius * (1.0 + SLACK),
+            reach_square: radius * radius,
+            slack: radius * SLACK,
             images: Vec::new(),
         };
         space.enclose(axes);
@@ -106,6 +119,7 @@ impl<const D: usize> Space<D> {
         for axis in 0..D {
             let n = (lengths[axis] / edge[axis]).ceil().clamp(1.0, most);
             self.cells[axis] = n as usize;
+            self.last[axis] = n - 1.0;
             self.edge[axis] = lengths[axis] / n;
             self.inverse_edge[axis] = n / lengths[axis];
         }
@@ -130,8 +144,12 @@ impl<const D: usize> Space<D> {
     #[inline(always)]
     pub fn along(&self, axis: usize, y: f64) -> usize {
         let cell = (y - self.low[axis]) * self.inverse_edge[axis];
-        // What is below zero or no number becomes 0.
-        (cell as usize).min(self.cells[axis] - 1)
+        // Also what is no number becomes 0.
+        let cell = if cell > 0.0 { cell } else { 0.0 };
+        let cell = if cell < self.last[axis] { cell } else { self.last[axis] };
+        let nearest = (cell + SHIFT) - SHIFT;
+        let whole = if nearest > cell { nearest - 1.0 } else { nearest };
+        ((whole + SHIFT).to_bits() & LOW_BITS) as usize
     }
 
     #[inline(always)]
@@ -146,18 +164,25 @@ impl<const D: usize> Space<D> {
     /// Distance along an axis from a place to a cell of it; the first and the last cell have no end.
     #[inline(always)]
     pub fn distance(&self, axis: usize, cell: usize, y: f64) -> f64 {
-        let low = self.low[axis] + cell as f64 * self.edge[axis];
-        let below = if cell > 0 { low - y } else { 0.0 };
-        let above = if cell + 1 < self.cells[axis] { y - (low + self.edge[axis]) } else { 0.0 };
+        let cell = cell as f64;
+        let low = self.low[axis] + cell * self.edge[axis];
+        let below = if cell > 0.0 { low - y } else { 0.0 };
+        let above = if cell < self.last[axis] { y - (low + self.edge[axis]) } else { 0.0 };
         let farther = if below > above { below } else { above };
         if farther > 0.0 { farther } else { 0.0 }
+    }
+
+    /// The radius, and a little more.
+    #[inline(always)]
+    pub fn reach(&self) -> f64 {
+        self.reach
     }
 
     /// What is left of the radius beside a square of a distance, a little more rather than less.
     #[inline(always)]
     pub fn rest(&self, square: f64) -> f64 {
-        let rest = self.radius * self.radius - square;
-        (if rest > 0.0 { rest } else { 0.0 }).sqrt() + SLACK * self.radius
+        let rest = self.reach_square - square;
+        (if rest > 0.0 { rest } else { 0.0 }).sqrt() + self.slack
     }
 
     /// Images that reach a place; none of those of most.
