@@ -61,6 +61,8 @@ enum KnobName {
     Damkohler,
     /// The step
     Step,
+    /// The bandwidth of an exchange
+    Bandwidth,
 }
 
 impl From<KnobName> for Knob {
@@ -73,6 +75,7 @@ impl From<KnobName> for Knob {
             KnobName::Peclet => Self::Peclet,
             KnobName::Damkohler => Self::Damkohler,
             KnobName::Step => Self::Step,
+            KnobName::Bandwidth => Self::Bandwidth,
         }
     }
 }

@@ -49,11 +49,12 @@ pub struct Trials {
 
 impl Trials {
     pub fn of(plan: &Plan) -> Self {
-        let interacts = plan
+        let mixes = plan
             .mixing
             .as_ref()
             .is_some_and(|mixing| mixing.zones.iter().any(|zone| zone.rate != ZoneRate::Finite(0.0)));
-        let matters = interacts || plan.outputs.iter().any(|output| output.kind.is_of_pairs());
+        let interacts = mixes || plan.exchange.is_some();
+        let matters = mixes || plan.outputs.iter().any(|output| output.kind.is_of_pairs());
         let halved = matters.then(|| half_bins(plan)).flatten();
         let has_step_error = has_step_error(plan);
         let fewer = fewer(plan);
@@ -86,8 +87,8 @@ impl Trials {
     }
 }
 
-/// Constant coefficients are walked exactly; the step shows in exchange, and where drift leans on a
-/// reflecting side.
+/// Constant coefficients are walked exactly; the step shows in exchange with means or with other parcels, and where
+/// drift leans on a reflecting side.
 fn has_step_error(plan: &Plan) -> bool {
     let exchanges = plan.mixing.as_ref().is_some_and(|mixing| {
         mixing.zones.iter().any(|zone| matches!(zone.rate, ZoneRate::Finite(rate) if rate > 0.0))
@@ -96,7 +97,7 @@ fn has_step_error(plan: &Plan) -> bool {
         let side = if drift < 0.0 { axis.low_side } else { axis.high_side };
         drift != 0.0 && side == Side::Reflect
     });
-    exchanges || leans
+    exchanges || plan.exchange.is_some() || leans
 }
 
 /// The seed of a group: the first eight bytes of a BLAKE3 of the root seed and the number.

@@ -5,7 +5,7 @@
 
 use super::shares::{places, speed, spread};
 use super::transport::{Flow, SubSteps, Transport};
-use super::{Axis, Output, Plan, Walk};
+use super::{Axis, Output, Plan};
 use crate::scenario::transport::Auto;
 
 /// Cells that a particle may cross in a step at the mean speed; within, its own sub-steps keep the criteria.
@@ -119,15 +119,18 @@ pub(super) fn times_between(outputs: &[Output], step: f64) -> impl Iterator<Item
 }
 
 /// The same for a walk of fluid in uniform flow, where any step has the right law.
-pub(super) fn of_fluid(axes: &[Axis], outputs: &[Output], walk: &Walk, auto: Auto, duration: f64) -> Chosen {
-    let velocity: Vec<f64> = walk.drift.iter().map(|v| v.abs()).collect();
-    let spread = |axis: usize| {
-        let row = &walk.spread[axis * (axis + 1) / 2..][..=axis];
-        0.5 * row.iter().map(|b| b * b).sum::<f64>()
-    };
-    let spread: Vec<f64> = (0..axes.len()).map(spread).collect();
-    let step = limit(&bin_sizes(axes, outputs), &velocity, &spread, auto);
+pub(super) fn of_fluid(plan: &Plan, auto: Auto, duration: f64) -> Chosen {
+    let velocity: Vec<f64> = plan.walk.drift.iter().map(|v| v.abs()).collect();
+    let spread: Vec<f64> = (0..plan.axes.len()).map(|axis| dispersion(plan, axis)).collect();
+    let step = limit(&bin_sizes(&plan.axes, &plan.outputs), &velocity, &spread, auto);
     Chosen { step: whole(step, duration), sub_steps: None }
+}
+
+/// What walks and what is exchanged along an axis, m²/s.
+fn dispersion(plan: &Plan, axis: usize) -> f64 {
+    let row = &plan.walk.spread[axis * (axis + 1) / 2..][..=axis];
+    let walks = 0.5 * row.iter().map(|b| b * b).sum::<f64>();
+    walks + plan.exchange.as_ref().map_or(0.0, |exchange| exchange.along(axis))
 }
 
 fn limit(sizes: &[f64], velocity: &[f64], spread: &[f64], auto: Auto) -> f64 {

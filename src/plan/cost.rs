@@ -136,8 +136,7 @@ pub fn estimate(plan: &Plan, scales: Option<&TimeScales>) -> Cost {
         + (table::OBSERVE_BIN + table::WRITE_ROW) * n_binned;
     let n_bins: f64 = plan.axes.iter().map(|axis| axis.bins as f64).product();
     Cost {
-        state_bytes: (8.0 * n_particles * (n_axes + n_values + f64::from(u8::from(plan.transport.is_some()))))
-            as u64,
+        state_bytes: (8.0 * n_particles * (n_axes + n_values + own_values(plan, n_values))) as u64,
         bin_bytes: (8.0 * n_bins * (1.0 + n_values) * 2.0) as u64,
         output_bytes: output_bytes(plan),
         particle_steps,
@@ -145,6 +144,14 @@ pub fn estimate(plan: &Plan, scales: Option<&TimeScales>) -> Cost {
         stages,
         cpu_seconds: nanoseconds * 1e-9,
     }
+}
+
+/// Numbers per particle beside its position and what it carries: of parcels that come and go, and of those that are
+/// sorted and weighed for an exchange.
+fn own_values(plan: &Plan, n_values: f64) -> f64 {
+    let of_exchange = 2.0 * plan.axes.len() as f64 + 3.0 * n_values + 4.0;
+    let exchanged = if plan.exchange.is_some() { of_exchange } else { 0.0 };
+    exchanged + f64::from(u8::from(plan.transport.is_some()))
 }
 
 /// Nanoseconds per particle and step of an exchange: neighbours are looked for and weighed twice in each sum.

@@ -3,7 +3,7 @@
 //! Owns the message about fluid that leaves or is held back (N105). May use `scenario` for the places.
 //! It deliberately looks at the initial concentrations along the axis of a side only.
 
-use super::limits::{axis_name, dispersion, short};
+use super::limits::{axis_name, short, walking_dispersion};
 use super::{Axis, Plan, Side};
 use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::N105;
@@ -34,7 +34,7 @@ pub(super) fn check(scenario: &Scenario, plan: &Plan, diagnostics: &mut Vec<Diag
         let Some(written) = scenario.domain.axes.iter().find(|written| written.index == axis.index) else {
             continue;
         };
-        let (drift, dispersion) = (plan.walk.drift[idx], dispersion(plan, idx));
+        let (drift, dispersion) = (plan.walk.drift[idx], walking_dispersion(plan, idx));
         let edges = Edges { plan, axis, written, drift, dispersion };
         diagnostics.extend(edges.emptied().or_else(|| edges.open()));
     }

@@ -9,6 +9,8 @@ use super::tape::dual::differentiate;
 use crate::catalog::kernel::{self, Item};
 use crate::maths::quadrature::integrate;
 use crate::maths::scalar::{exp, pow};
+pub use crate::scenario::exchange::{CUTOFFS, Cutoff};
+pub use crate::scenario::{Integration, Normalisation};
 use serde::{Deserialize, Serialize};
 
 /// Exchange of everything that parcels carry.
@@ -35,46 +37,6 @@ pub enum Kernel {
     /// Of the scene: W over the input q, and where it ends.
     Profile { name: String, value: Tape, support: f64 },
 }
-
-/// Where kernels without an end are cut off.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Cutoff {
-    /// In bandwidths.
-    Radius(f64),
-    /// At the least radius with this relative error of the dispersion, before it is compensated.
-    Error(f64),
-}
-
-/// What makes weights of kernels.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Normalisation {
-    /// `w_ij / ½(ρ_i + ρ_j)`
-    Arithmetic,
-    /// `w_ij / √(ρ_i ρ_j)`
-    Geometric,
-    /// `u_i w_ij u_j` with sums of one.
-    Sinkhorn,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Integration {
-    Explicit,
-    Implicit,
-    Exponential,
-}
-
-impl Default for Cutoff {
-    /// Half a digit below what a plume of 10⁵ particles shows; about five bandwidths.
-    fn default() -> Self {
-        Self::Error(1e-5)
-    }
-}
-
-/// Radii that a kernel may be cut off at, in bandwidths.
-pub const CUTOFFS: std::ops::RangeInclusive<f64> = 1.0..=8.0;
 
 /// What follows from a plan for its exchange.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -154,6 +116,11 @@ impl Exchange {
             neighbours,
             diffusion,
         }
+    }
+
+    /// Dispersion by exchange along an axis, m²/s.
+    pub fn along(&self, axis_idx: usize) -> f64 {
+        self.diffusion[axis_idx * (axis_idx + 1) / 2 + axis_idx]
     }
 
     /// Whether it is well-formed for so many axes.

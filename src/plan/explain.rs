@@ -3,7 +3,7 @@
 use super::compile::Compiled;
 use super::cost::{Cost, n_stored_values};
 use super::{Normals, Plan, Quantity, Stage, ZoneRate};
-use super::{explain_reactions, explain_transport};
+use super::{explain_exchange, explain_reactions, explain_transport};
 use crate::diagnostic::number;
 use std::fmt::Write as _;
 
@@ -17,6 +17,7 @@ pub fn explain(compiled: &Compiled, name: &str, title: Option<&str>) -> String {
     let _ = writeln!(text, "  hash {}", compiled.hash);
     section(&mut text, "what runs", &scene_lines(&compiled.plan));
     section(&mut text, "transport", &explain_transport::lines(&compiled.plan));
+    section(&mut text, "exchange", &explain_exchange::lines(&compiled.plan));
     section(&mut text, "each step, in this order", &step_lines(compiled));
     section(&mut text, "what particles carry", &field_lines(&compiled.plan));
     section(&mut text, "reactions", &explain_reactions::lines(&compiled.plan));
@@ -75,7 +76,7 @@ fn scene_lines(plan: &Plan) -> Vec<String> {
         let b = &plan.walk.spread[idx * (idx + 1) / 2..][..=idx];
         let dispersion = 0.5 * b.iter().map(|b| b * b).sum::<f64>();
         lines.push(format!(
-            "axis {}: {} .. {} m ({} / {}), {} bins, drift {} m/s, dispersion {} m^2/s",
+            "axis {}: {} .. {} m ({} / {}), {} bins, drift {} m/s, {} {} m^2/s",
             axis_name(axis.index),
             number(axis.low),
             number(axis.high),
@@ -83,6 +84,7 @@ fn scene_lines(plan: &Plan) -> Vec<String> {
             axis.high_side.word(),
             axis.bins,
             number(plan.walk.drift[idx]),
+            if plan.exchange.is_some() { "dispersion by walk" } else { "dispersion" },
             number(dispersion),
         ));
     }

@@ -6,7 +6,7 @@
 use super::cost::Cost;
 use super::passes::Draft;
 use super::time_scales::TimeScales;
-use super::{OutputKind, Plan, ZoneRate, auto_step, edges, reaction_limits, shares};
+use super::{OutputKind, Plan, ZoneRate, auto_step, edges, exchange_limits, reaction_limits, shares};
 use crate::diagnostic::codes::{N101, N102, N103, N104, N201, N202, N203, N204, N301};
 use crate::diagnostic::{Diagnostic, number, precise};
 use crate::scenario::{self, MAX_BINS, Scenario};
@@ -56,6 +56,7 @@ pub fn check(
         exchange(scenario, plan, &mut limits, &mut diagnostics);
         numerical_dispersion(scenario, plan, &mut limits, &mut diagnostics);
     }
+    exchange_limits::check(scenario, plan, cost, &mut limits, &mut diagnostics);
     reaction_limits::check(scenario, plan, scales, &mut limits, &mut diagnostics);
     check_memory(scenario, plan, cost, memory, &mut diagnostics);
     (limits, diagnostics)
@@ -100,8 +101,14 @@ fn spread_length(plan: &Plan, axis_idx: usize, step: f64) -> f64 {
     largest * row.iter().map(|b| (b / largest) * (b / largest)).sum::<f64>().sqrt() * step.sqrt()
 }
 
-/// Dispersion coefficient along an axis, m²/s; the largest one where it varies.
+/// Dispersion coefficient along an axis, m²/s, by walk and exchange; the largest one where it varies.
 pub(super) fn dispersion(plan: &Plan, axis_idx: usize) -> f64 {
+    let exchanged = plan.exchange.as_ref().map_or(0.0, |exchange| exchange.along(axis_idx));
+    walking_dispersion(plan, axis_idx) + exchanged
+}
+
+/// The part of it that moves parcels.
+pub(super) fn walking_dispersion(plan: &Plan, axis_idx: usize) -> f64 {
     if let Some(transport) = &plan.transport {
         let speed = shares::speed(&plan.axes, transport);
         return shares::spread(&plan.axes, &transport.dispersion, speed);
@@ -243,7 +250,7 @@ pub(crate) fn round_down(seconds: f64) -> String {
 }
 
 /// Three figures, not below the given value.
-fn short_up(value: f64) -> String {
+pub(super) fn short_up(value: f64) -> String {
     number(rounded(value, 3, 1))
 }
 

@@ -4,6 +4,7 @@ use super::build_tape::build_reference;
 use super::evaluation::{self, Evaluation};
 use super::lower_chemistry::{self, Network};
 use super::lower_decay;
+use super::lower_exchange;
 use super::lower_transport::{self, of_fluid};
 use super::{
     Axis, InstantReaction, Mixing, NUMERICS_VERSION, Normals, Output, OutputUnit, Particles, Plan, Quantity,
@@ -29,6 +30,7 @@ pub fn lower(scenario: &Scenario) -> Result<Lowered, Vec<Diagnostic>> {
     let axes: Vec<Axis> =
         scenario.domain.axes.iter().zip(bins).map(|(axis, bins)| lower_axis(axis, bins)).collect();
     let decay = lower_decay::decay(scenario)?;
+    let exchange = lower_exchange::exchange(scenario)?;
     let network = lower_chemistry::network(scenario, &axes)?;
     let (transport, told) = lower_transport::transport(scenario, &axes, &network, decay)?;
     let Network { species, components, chemistry, mut warnings, .. } = network;
@@ -51,7 +53,7 @@ pub fn lower(scenario: &Scenario) -> Result<Lowered, Vec<Diagnostic>> {
         species,
         components,
         mixing: scenario.mixing.as_ref().map(lower_mixing),
-        exchange: None,
+        exchange,
         reactions: scenario.reactions.iter().filter_map(lower_reaction).collect(),
         chemistry,
         transport,
@@ -78,6 +80,9 @@ pub fn lower(scenario: &Scenario) -> Result<Lowered, Vec<Diagnostic>> {
         if !found.is_empty() {
             return Err(found);
         }
+    }
+    if plan.exchange.is_some() {
+        plan.stages.insert(3, Stage::Exchange);
     }
     method::choose(&mut plan);
     if plan.reacts_in_steps() {
@@ -111,7 +116,7 @@ fn choose_step(scenario: &Scenario, plan: &mut Plan, auto: Auto) -> Result<(), V
     let duration = scenario.run.duration;
     let chosen = match &plan.transport {
         Some(transport) => auto_step::of_masses(&plan.axes, &plan.outputs, transport, auto, duration),
-        None => auto_step::of_fluid(&plan.axes, &plan.outputs, &plan.walk, auto, duration),
+        None => auto_step::of_fluid(plan, auto, duration),
     };
     let n_steps = duration / chosen.step;
     if n_steps > scenario::MAX_STEPS {
@@ -158,11 +163,13 @@ fn lower_axis(axis: &scenario::Axis, bins: usize) -> Axis {
 /// Drift in the frame and the Cholesky factor of 2 D over the axes of the domain.
 fn walk(scenario: &Scenario) -> Walk {
     let (velocity, tensor) = of_fluid(scenario);
+    // What is exchanged does not walk.
+    let part = lower_exchange::walking_part(scenario);
     let indices: Vec<usize> = scenario.domain.axes.iter().map(|axis| axis.index).collect();
     let drift = indices.iter().map(|&index| velocity[index] - scenario.domain.frame[index]).collect();
     let doubled: Vec<Vec<f64>> = indices
         .iter()
-        .map(|&row| indices.iter().map(|&column| 2.0 * tensor[row][column]).collect())
+        .map(|&row| indices.iter().map(|&column| 2.0 * (part * tensor[row][column])).collect())
         .collect();
     let normals = if scenario.run.are_normals_double { Normals::Double } else { Normals::Single };
     Walk { drift, spread: cholesky(&doubled), normals }

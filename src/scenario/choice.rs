@@ -105,6 +105,53 @@ pub enum Integrator {
 pub(super) const INTEGRATORS: &[(&str, Integrator)] =
     &[("auto", Integrator::Auto), ("explicit", Integrator::Explicit), ("rosenbrock", Integrator::Rosenbrock)];
 
+/// What makes weights of kernels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Normalisation {
+    /// `w_ij / ½(ρ_i + ρ_j)`
+    Arithmetic,
+    /// `w_ij / √(ρ_i ρ_j)`
+    Geometric,
+    /// `u_i w_ij u_j` with sums of one.
+    Sinkhorn,
+}
+
+pub(super) const NORMALISATIONS: &[(&str, Normalisation)] = &[
+    ("arithmetic", Normalisation::Arithmetic),
+    ("geometric", Normalisation::Geometric),
+    ("sinkhorn", Normalisation::Sinkhorn),
+];
+
+impl Normalisation {
+    /// The word of the language.
+    pub fn word(self) -> &'static str {
+        word(NORMALISATIONS, self)
+    }
+}
+
+/// How an exchange is taken over a step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Integration {
+    Explicit,
+    Implicit,
+    Exponential,
+}
+
+pub(super) const INTEGRATIONS: &[(&str, Integration)] = &[
+    ("explicit", Integration::Explicit),
+    ("implicit", Integration::Implicit),
+    ("exponential", Integration::Exponential),
+];
+
+impl Integration {
+    /// The word of the language.
+    pub fn word(self) -> &'static str {
+        word(INTEGRATIONS, self)
+    }
+}
+
 /// A place that is watched.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -31,6 +31,8 @@ pub(super) struct Statements<'a> {
     pub dispersion: Option<(Span, &'a tree::Dispersion)>,
     pub sources: Vec<(Span, &'a tree::Source)>,
     pub zones: Option<(Span, &'a [tree::Zone])>,
+    pub exchange: Option<(Span, &'a [tree::Field])>,
+    pub kernels: Vec<&'a tree::Kernel>,
     pub average: Option<(Span, &'a tree::Average)>,
     pub initials: Vec<&'a tree::Assignment>,
     pub particles: Option<(Span, &'a tree::Particles)>,
@@ -160,6 +162,8 @@ fn gather<'a>(file: &'a tree::File, diagnostics: &mut Vec<Diagnostic>) -> Statem
             StatementKind::Flow(s) => all.flow = Some((span, s)),
             StatementKind::Dispersion(s) => all.dispersion = Some((span, s)),
             StatementKind::MixingZones(s) => all.zones = Some((span, s)),
+            StatementKind::Exchange(s) => all.exchange = Some((span, s)),
+            StatementKind::Kernel(s) => all.kernels.push(s),
             StatementKind::Average(s) => all.average = Some((span, s)),
             StatementKind::Initial(list) => all.initials.extend(list),
             StatementKind::Particles(s) => all.particles = Some((span, s)),
@@ -187,6 +191,7 @@ fn single(kind: &StatementKind) -> Option<&'static str> {
         StatementKind::Flow(_) => "flow",
         StatementKind::Dispersion(_) => "dispersion",
         StatementKind::MixingZones(_) => "mixing zones",
+        StatementKind::Exchange(_) => "exchange",
         StatementKind::Average(_) => "average",
         StatementKind::Particles(_) => "particles",
         StatementKind::Run(_) => "run",
@@ -210,6 +215,9 @@ fn define_names<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>, over
     }
     for statement in &statements.data {
         scope.define(&statement.name, Origin::Data(statement), &axes, diagnostics);
+    }
+    for statement in &statements.kernels {
+        scope.define(&statement.name, Origin::Kernel, &axes, diagnostics);
     }
     for (idx, statement) in statements.species.iter().enumerate() {
         scope.define(&statement.name, Origin::Species(idx), &axes, diagnostics);
@@ -260,6 +268,8 @@ fn build<'a>(
     let chemistry = super::chemistry::chemistry(checker, statements);
     let motion = motion(checker, statements, domain.as_mut());
     let mixing = super::zones::mixing(checker, statements);
+    let kernels = super::exchange::kernels(checker, statements);
+    let exchange = super::exchange::exchange(checker, statements);
     let bins = super::geometry::bins(checker, statements);
     let particles = super::transport::masses::particles(checker, statements);
     if let (Some(domain), Some(particles)) = (&domain, &particles) {
@@ -300,6 +310,8 @@ fn build<'a>(
         dispersion,
         sources: sources?,
         mixing: mixing?,
+        exchange: exchange?,
+        kernels: kernels?,
         bins: bins?,
         particles: particles?,
         run: run?,
@@ -319,6 +331,7 @@ fn check_together(checker: &mut Checker<'_>, scenario: &Scenario) {
     super::data::check_extents(checker, scenario);
     super::reactions::check_places(checker, scenario);
     super::transport::restriction::check(checker, scenario);
+    super::exchange_places::check(checker, scenario);
 }
 
 /// `--set name=value` without the blanks around.

@@ -12,6 +12,8 @@ pub mod condition;
 mod data;
 mod data_files;
 mod equilibrium;
+pub mod exchange;
+mod exchange_places;
 pub mod expression;
 mod fields;
 mod flow_table;
@@ -44,7 +46,7 @@ use crate::units::Dimension;
 use expression::Expr;
 use transport::{Auto, Dispersion, Flow, Patch, Shares, Source};
 
-pub use choice::{Activity, Covariance, Integrator, OutputKind, Placement, Side, Splitting, Station};
+pub use choice::{Activity, Covariance, Integration, Integrator, Normalisation, OutputKind, Placement, Side, Splitting, Station};
 pub use collect::resolve;
 pub use data_files::wanted_data;
 pub use geometry::MAX_BINS;
@@ -87,6 +89,10 @@ pub struct Scenario {
     pub dispersion: Option<Spanned<Dispersion>>,
     pub sources: Vec<Source>,
     pub mixing: Option<Mixing>,
+    /// Absent without an `exchange` statement.
+    pub exchange: Option<exchange::Exchange>,
+    /// The scene's own kernels.
+    pub kernels: Vec<exchange::Kernel>,
     /// Bins of the averages, one count per axis of the domain.
     pub bins: Option<Spanned<Vec<usize>>>,
     pub particles: Particles,

@@ -16,7 +16,8 @@ pub(super) fn report_unused(scope: &Scope<'_>, diagnostics: &mut Vec<Diagnostic>
     let circular = report_circles(scope, diagnostics);
     for (name, entry) in scope.iter() {
         let is_constant =
-            matches!(entry.origin, Origin::Let(_) | Origin::Param(_) | Origin::Function(_) | Origin::Data(_));
+            matches!(entry.origin, Origin::Let(_) | Origin::Param(_) | Origin::Function(_) | Origin::Data(_))
+                || matches!(entry.origin, Origin::Kernel);
         let is_told = matches!(entry.progress, Progress::Wrong) || circular.contains(&name.as_str());
         if is_constant && entry.n_uses == 0 && !is_told {
             diagnostics.push(

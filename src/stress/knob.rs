@@ -27,10 +27,12 @@ pub enum Knob {
     Damkohler,
     /// The step.
     Step,
+    /// The bandwidth of an exchange.
+    Bandwidth,
 }
 
 impl Knob {
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Rates,
         Self::Concentrations,
         Self::HalfSaturation,
@@ -38,6 +40,7 @@ impl Knob {
         Self::Peclet,
         Self::Damkohler,
         Self::Step,
+        Self::Bandwidth,
     ];
 
     /// As it is written on the command line and in tables.
@@ -50,6 +53,7 @@ impl Knob {
             Self::Peclet => "peclet",
             Self::Damkohler => "damkohler",
             Self::Step => "step",
+            Self::Bandwidth => "bandwidth",
         }
     }
 
@@ -64,7 +68,7 @@ impl Knob {
     fn is_in(self, plan: &Plan) -> bool {
         let kinetics = plan.chemistry.as_ref().and_then(|chemistry| chemistry.kinetics.as_ref());
         let equilibrium = plan.chemistry.as_ref().and_then(|chemistry| chemistry.equilibrium.as_ref());
-        let is_moving = plan.walk.drift.iter().chain(&plan.walk.spread).any(|entry| *entry != 0.0);
+        let is_moving = plan.exchange.is_some() || plan.moves();
         match self {
             Self::Rates => kinetics.is_some() || plan.transport.iter().any(|it| it.decay.is_some()),
             Self::Concentrations => !plan.components.is_empty(),
@@ -72,11 +76,14 @@ impl Knob {
                 kinetics.is_some_and(|kinetics| !half_saturations(&kinetics.laws.operations).is_empty())
             }
             Self::Equilibrium => equilibrium.is_some(),
-            Self::Peclet => plan.walk.spread.iter().any(|entry| *entry != 0.0),
+            Self::Peclet => {
+                plan.exchange.is_some() || plan.walk.spread.iter().any(|entry| *entry != 0.0)
+            }
             Self::Damkohler => {
                 (kinetics.is_some() || equilibrium.is_some()) && (is_moving || exchanges(plan))
             }
             Self::Step => true,
+            Self::Bandwidth => plan.exchange.is_some(),
         }
     }
 
@@ -104,11 +111,13 @@ impl Knob {
             Self::Peclet => {
                 let root = factor.sqrt();
                 plan.walk.spread.iter_mut().for_each(|entry| *entry /= root);
+                divide_exchange(plan, factor);
             }
             Self::Damkohler => {
                 let root = factor.sqrt();
                 plan.walk.drift.iter_mut().for_each(|entry| *entry /= factor);
                 plan.walk.spread.iter_mut().for_each(|entry| *entry /= root);
+                divide_exchange(plan, factor);
                 for zone in plan.mixing.iter_mut().flat_map(|mixing| &mut mixing.zones) {
                     if let ZoneRate::Finite(rate) = &mut zone.rate {
                         *rate /= factor;
@@ -119,6 +128,9 @@ impl Knob {
                 let duration = plan.time.duration;
                 plan.time = Time::new(duration, (plan.time.step * factor).min(duration));
             }
+            Self::Bandwidth => {
+                plan.exchange.iter_mut().for_each(|exchange| multiply(&mut exchange.bandwidth, factor));
+            }
         }
     }
 }
@@ -126,6 +138,11 @@ impl Knob {
 fn exchanges(plan: &Plan) -> bool {
     let mut zones = plan.mixing.iter().flat_map(|mixing| &mixing.zones);
     zones.any(|zone| matches!(zone.rate, ZoneRate::Finite(rate) if rate > 0.0))
+}
+
+fn divide_exchange(plan: &mut Plan, factor: f64) {
+    let entries = plan.exchange.iter_mut().flat_map(|exchange| &mut exchange.diffusion);
+    entries.for_each(|entry| *entry /= factor);
 }
 
 fn multiply(tape: &mut Tape, factor: f64) {

@@ -29,6 +29,8 @@ pub fn rule_of(keyword: &str) -> Option<Rule> {
         "dispersion" => Rule::dispersion,
         "source" => Rule::source,
         "mixing" => Rule::mixing,
+        "exchange" => Rule::exchange,
+        "kernel" => Rule::kernel,
         "average" => Rule::average,
         "initial" => Rule::initial,
         "particles" => Rule::particles,

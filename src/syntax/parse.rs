@@ -10,7 +10,7 @@ use super::grammar::{Grammar, rule_of};
 use super::lexer::tokenize;
 use super::split::{Chunk, Lexed, split};
 use super::tree::{File, Statement, StatementKind, TokenKind};
-use super::words::{LATER_KEYWORDS, RESERVED_WORDS, STATEMENT_KEYWORDS, is_statement_keyword};
+use super::words::{LATER_FORMS, RESERVED_WORDS, STATEMENT_KEYWORDS, is_statement_keyword};
 use crate::diagnostic::{Diagnostic, codes, did_you_mean};
 use crate::source::{FileId, Span};
 use pest::Parser;
@@ -82,6 +82,9 @@ fn parse_statement(file: FileId, lexed: Lexed, chunk: &Chunk) -> Result<Statemen
         return Err(before_grammar);
     }
     let keyword = lexed.slice(chunk.first);
+    if let Some(refusal) = later_form(lexed, chunk) {
+        return Err(vec![refusal]);
+    }
     let Some(rule) = rule_of(keyword) else { return Err(vec![unknown_statement(lexed, chunk)]) };
     let span = chunk_span(lexed, chunk);
     let place = Place { file, offset: span.start as usize };
@@ -96,15 +99,22 @@ fn chunk_span(lexed: Lexed, chunk: &Chunk) -> Span {
     lexed.tokens[chunk.first].span.to(lexed.tokens[chunk.end - 1].span)
 }
 
+/// A statement in a form that only later versions run.
+fn later_form(lexed: Lexed, chunk: &Chunk) -> Option<Diagnostic> {
+    let mut words = (chunk.first..chunk.end).filter(|&idx| lexed.is_significant(idx));
+    let (keyword, _, word) = (words.next()?, words.next()?, words.next()?);
+    let form = (lexed.slice(keyword), lexed.slice(word));
+    LATER_FORMS.contains(&form).then(|| {
+        Diagnostic::error(codes::S003, format!("`{} … {}` is not in this version", form.0, form.1))
+            .at(lexed.tokens[word].span, "this statement is known to the language, but not built yet")
+            .help("leave it out")
+    })
+}
+
 /// A line whose first word begins no statement.
 fn unknown_statement(lexed: Lexed, chunk: &Chunk) -> Diagnostic {
     let span = lexed.tokens[chunk.first].span;
     let word = lexed.slice(chunk.first);
-    if LATER_KEYWORDS.contains(&word) {
-        return Diagnostic::error(codes::S003, format!("`{word}` is not in this version"))
-            .at(span, "this statement is known to the language, but not built yet")
-            .help("leave it out");
-    }
     if lexed.kind(chunk.first) != Some(TokenKind::Word) || RESERVED_WORDS.contains(&word) {
         return Diagnostic::error(codes::S001, "a statement begins with its keyword")
             .at(span, "this begins no statement")
@@ -132,7 +142,7 @@ fn unknown_statement(lexed: Lexed, chunk: &Chunk) -> Diagnostic {
 }
 
 fn all_keywords() -> impl Iterator<Item = &'static str> {
-    STATEMENT_KEYWORDS.iter().chain(LATER_KEYWORDS).copied()
+    STATEMENT_KEYWORDS.iter().copied()
 }
 
 /// `lamella 1` is the first statement, and the only one of its kind.

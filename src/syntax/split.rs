@@ -4,7 +4,7 @@
 //! It deliberately looks at no grammar: a broken statement must not change where the next begins.
 
 use super::tree::{Token, TokenKind};
-use super::words::{BODY_KEYWORDS, LATER_KEYWORDS, RESERVED_WORDS, is_statement_keyword};
+use super::words::{BODY_KEYWORDS, RESERVED_WORDS, is_statement_keyword};
 
 /// The tokens of one statement without blanks around it: from its first word to its last token.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -132,7 +132,7 @@ impl<'t> Splitter<'t> {
     /// The closing brace of a statement whose body may hold what looks like statements.
     fn body_to_skip(&self, idx: usize, closing: &[Option<u32>]) -> Option<usize> {
         let keyword = self.lexed.slice(self.current.as_ref()?.first);
-        let has_body = LATER_KEYWORDS.contains(&keyword) || BODY_KEYWORDS.contains(&keyword);
+        let has_body = BODY_KEYWORDS.contains(&keyword);
         let is_body = has_body && self.lexed.slice(idx) == "{";
         is_body.then(|| closing[idx].map(|close| close as usize)).flatten()
     }
@@ -165,6 +165,10 @@ fn looks_like_statement(lexed: Lexed, idx: usize) -> bool {
     }
     let Some(next) = lexed.next_on_line(idx + 1) else { return false };
     match lexed.tokens[next].kind {
+        // `kernel gaussian` is a setting of an exchange that goes on.
+        TokenKind::Word if lexed.slice(idx) == "kernel" => {
+            lexed.next_on_line(next + 1).is_some_and(|after| matches!(lexed.slice(after), "(" | "adaptive"))
+        }
         TokenKind::Word => !RESERVED_WORDS.contains(&lexed.slice(next)),
         TokenKind::Text | TokenKind::Number => true,
         _ => lexed.slice(idx) == "dispersion" && lexed.slice(next) == "(",

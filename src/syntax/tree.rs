@@ -4,12 +4,14 @@
 //! It deliberately knows no physics: a unit is text here, a species is a name.
 
 mod data;
+mod kernel;
 mod outputs;
 mod study;
 mod transport;
 
 use crate::source::{Span, Spanned};
 pub use data::{Data, DataColumn};
+pub use kernel::Kernel;
 pub use outputs::{Output, Place, Times};
 pub use study::{Criterion, Expect, Replicates, Report, Sweep, SweepAxis, SweepEntry, SweepValue, Use};
 pub use transport::{
@@ -105,6 +107,10 @@ pub enum StatementKind {
     Source(Source),
     /// `mixing zones { fast: fraction 0.5, rate instant … }`
     MixingZones(Vec<Zone>),
+    /// `exchange kernel gaussian, bandwidth collocation`: settings in the order written.
+    Exchange(Vec<Field>),
+    /// `kernel W(q) = (1 - q/2)^4 * (1 + 2*q) support 2 "doc"`
+    Kernel(Kernel),
     /// `average bins 300` or `average bins 100 x 50`
     Average(Average),
     /// `initial A = …, B = …`

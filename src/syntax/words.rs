@@ -22,6 +22,8 @@ pub const STATEMENT_KEYWORDS: &[&str] = &[
     "dispersion",
     "source",
     "mixing",
+    "exchange",
+    "kernel",
     "average",
     "initial",
     "particles",
@@ -35,11 +37,11 @@ pub const STATEMENT_KEYWORDS: &[&str] = &[
     "report",
 ];
 
-/// First words that the language description knows and this version does not run yet.
-pub const LATER_KEYWORDS: &[&str] = &["kernel"];
+/// Forms of statements that this version does not run yet: the keyword, and the word after the name.
+pub const LATER_FORMS: &[(&str, &str)] = &[("kernel", "adaptive")];
 
 /// Statements whose body in braces may hold what looks like statements.
-pub const BODY_KEYWORDS: &[&str] = &["sweep"];
+pub const BODY_KEYWORDS: &[&str] = &["sweep", "kernel"];
 
 /// The first words of the entries of a sweep that are not axes.
 pub const SWEEP_ENTRIES: &[&str] = &["replicates", "seed", "common_random_numbers", "skip", "expect", "zip"];
@@ -50,9 +52,14 @@ pub const RESERVED_WORDS: &[&str] = &[
     "of", "during", "by", "when",
 ];
 
-/// Whether a word begins a statement of this or a later version.
+/// Whether a word begins a statement.
 pub fn is_statement_keyword(word: &str) -> bool {
-    STATEMENT_KEYWORDS.contains(&word) || LATER_KEYWORDS.contains(&word)
+    STATEMENT_KEYWORDS.contains(&word)
+}
+
+/// Whether a word cannot be a unit, although it follows a number: what goes on with the statement does.
+pub fn is_no_unit(word: &str) -> bool {
+    RESERVED_WORDS.contains(&word) || word == "support"
 }
 
 /// The clause words that a statement knows, for a misspelling of one of them.
@@ -83,6 +90,17 @@ pub fn clause_words(keyword: &str) -> &'static [&'static str] {
         ],
         "dispersion" => &["longitudinal", "transverse", "transverse_vertical", "molecular"],
         "source" => &["at", "in", "along", "during"],
+        "exchange" => &[
+            "kernel",
+            "bandwidth",
+            "mixing_fraction",
+            "normalise",
+            "integrate",
+            "cutoff",
+            "diffusion_error",
+            "compensate",
+        ],
+        "kernel" => &["support"],
         "mixing" => &["zones", "fraction", "rate"],
         "run" => &["to", "step"],
         "output" => &["at", "every", "along", "on", "in", "resident", "flux_weighted"],
@@ -104,7 +122,7 @@ mod tests {
 
     #[test]
     fn a_word_has_one_role() {
-        for word in STATEMENT_KEYWORDS.iter().chain(LATER_KEYWORDS) {
+        for word in STATEMENT_KEYWORDS {
             assert!(!RESERVED_WORDS.contains(word), "{word}");
         }
     }

@@ -9,7 +9,8 @@ use crate::plan::{Output, OutputKind, Plan, Side};
 
 pub(super) fn run(draft: &mut Draft) {
     // Sides, sources and flows of tracks have places along every axis.
-    if draft.plan.transport.is_some() {
+    // Distances of parcels, by which they exchange, are those over all axes.
+    if draft.plan.transport.is_some() || draft.plan.exchange.is_some() {
         return;
     }
     let mut axis_idx = 0;

@@ -4,6 +4,7 @@
 //! never changes what the outputs mean: the driver checks that after each pass.
 
 mod axes;
+mod exchange;
 mod network;
 mod order;
 mod outputs;
@@ -59,6 +60,8 @@ pub const PASSES: &[Pass] = &[
     Pass { name: "equal zones", run: zones::merge_equal, keeps_bytes: false },
     // After species: only what is carried can be derived from one another.
     Pass { name: "relations", run: relations::run, keeps_bytes: false },
+    // After relations: what nobody carries nobody exchanges. Before axes, which an exchange needs all of.
+    Pass { name: "exchange", run: exchange::run, keeps_bytes: true },
     // After relations: fewer fields, fewer gradients. Other particles are drawn: equal in law only.
     Pass { name: "axes", run: axes::run, keeps_bytes: false },
     // Where particles lie in memory hangs on the flow alone.

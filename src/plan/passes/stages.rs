@@ -27,7 +27,10 @@ pub(super) fn run(draft: &mut Draft) {
         ));
     }
     if !moves {
-        notes.push(("moving particles", "neither flow in the frame nor dispersion"));
+        notes.push(match plan.exchange {
+            None => ("moving particles", "neither flow in the frame nor dispersion"),
+            Some(_) => ("moving particles", "no flow in the frame, and all dispersion is exchange"),
+        });
     }
     if !observes {
         notes.push(("observation", "no outputs"));

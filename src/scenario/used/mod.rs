@@ -166,6 +166,7 @@ fn defined_by(kind: &StatementKind) -> Vec<&tree::Name> {
         StatementKind::Param(it) => vec![&it.name],
         StatementKind::Function(it) => vec![&it.name],
         StatementKind::Data(it) => vec![&it.name],
+        StatementKind::Kernel(it) => vec![&it.name],
         StatementKind::Species(list) => list.iter().map(|species| &species.name).collect(),
         StatementKind::Reaction(it) => it.name.iter().collect(),
         StatementKind::Reference(it) => reference_name(it).into_iter().collect(),

@@ -36,7 +36,13 @@ pub(super) fn visit(kind: &mut StatementKind, visitor: &mut impl Visitor) {
                 Rate::Directions(list) => list.iter_mut().for_each(|it| expression(&mut it.value, visitor)),
             }
         }
-        StatementKind::Chemistry(list) | StatementKind::Medium(list) => fields(list, visitor),
+        StatementKind::Chemistry(list) | StatementKind::Medium(list) | StatementKind::Exchange(list) => {
+            fields(list, visitor)
+        }
+        StatementKind::Kernel(it) => {
+            expression(&mut it.value, visitor);
+            expression(&mut it.support, visitor);
+        }
         StatementKind::Domain(it) => {
             it.axes.iter_mut().for_each(|it| axis(it, visitor));
             it.frame.iter_mut().for_each(|it| expression(it, visitor));

@@ -143,7 +143,7 @@ fn is_keyword(rule: Rule) -> bool {
             | R::kw_chemistry
             | R::kw_mixing
             | R::kw_average
-    ) || matches!(rule, R::kw_medium | R::kw_source)
+    ) || matches!(rule, R::kw_medium | R::kw_source | R::kw_exchange | R::kw_kernel)
         || matches!(
             rule,
             R::kw_initial | R::kw_particles | R::kw_run | R::kw_output | R::kw_reference | R::kw_measure
@@ -154,6 +154,7 @@ fn is_keyword(rule: Rule) -> bool {
         R::kw_zones
             | R::kw_frame
             | R::kw_moving
+            | R::kw_support
             | R::kw_to
             | R::kw_step
             | R::kw_t

@@ -10,7 +10,7 @@ use crate::source::{Span, Spanned};
 use crate::syntax::climb::Built;
 use crate::syntax::grammar::Rule;
 use crate::syntax::tree::{
-    self, Arrow, Assignment, Average, Axis, Count, Domain, Expr, ExprKind, Field, Function, Let, Measure,
+    self, Arrow, Assignment, Average, Axis, Count, Domain, Expr, ExprKind, Field, Function, Kernel, Let, Measure,
     Output, Param, Particles, Qualifier, Rate, Reaction, Reference, Run, Species, StatementKind, Target,
     Term, Times, UnaryOperator, Use, Zone,
 };
@@ -46,6 +46,8 @@ pub fn kind(mut parts: Parts, rule: Rule) -> Built<StatementKind> {
         Rule::dispersion => S::Dispersion(transport::dispersion(parts)?),
         Rule::source => S::Source(transport::source(parts)?),
         Rule::mixing => S::MixingZones(each(parts, Rule::zone, zone)?),
+        Rule::exchange => S::Exchange(each(parts, Rule::exchange_setting, field)?),
+        Rule::kernel => S::Kernel(kernel(parts)?),
         Rule::average => {
             S::Average(Average { kind: parts.wrapped_name(Rule::kind)?, counts: counts(parts)? })
         }
@@ -86,6 +88,14 @@ fn parameter(parts: &mut Parts) -> Built<Param> {
     let has_range = parts.pairs.peek().is_some_and(|pair| pair.as_rule() == Rule::range);
     let range = has_range.then(|| parts.range()).transpose()?;
     Ok(Param { name, value, range, doc: parts.optional_text()? })
+}
+
+/// `W(q) = (1 - q)^2 support 1`
+fn kernel(parts: &mut Parts) -> Built<Kernel> {
+    let (name, parameter, value) = (parts.name()?, parts.name()?, parts.expression()?);
+    let support = parts.need(Rule::support)?;
+    let support = Parts::of(parts.place, support).expression()?;
+    Ok(Kernel { name, parameter, value, support, doc: parts.optional_text()? })
 }
 
 fn species(parts: &mut Parts) -> Built<Species> {

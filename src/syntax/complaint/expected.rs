@@ -39,6 +39,7 @@ pub fn literal(rule: Rule) -> Option<&'static str> {
         R::kw_zones => "zones",
         R::kw_frame | R::frame => "frame",
         R::kw_moving => "moving",
+        R::kw_support | R::support => "support",
         R::kw_to => "to",
         R::kw_step | R::run_step => "step",
         R::kw_in | R::in_unit | R::in_box => "in",
@@ -89,7 +90,7 @@ pub fn expected_words(rule: Rule) -> Vec<String> {
         }
         R::reactants | R::products | R::target_kind | R::share => one("a name"),
         R::kind | R::output_kind | R::shape | R::boundary_kind => one("a kind"),
-        R::setting | R::chemistry_setting => one("a setting"),
+        R::setting | R::chemistry_setting | R::exchange_setting => one("a setting"),
         R::rate | R::signed_number | R::corner | R::region_argument | R::sweep_value | R::progression => {
             one(VALUE)
         }

@@ -13,7 +13,7 @@ pub use expected::quoted;
 use super::grammar::Rule;
 use super::split::{Chunk, Lexed, track_bracket};
 use super::tree::TokenKind;
-use super::words::{RESERVED_WORDS, clause_words};
+use super::words::{RESERVED_WORDS, clause_words, is_no_unit};
 use crate::diagnostic::{Diagnostic, codes, did_you_mean};
 use crate::source::Span;
 use crate::units::is_unit_symbol;
@@ -191,7 +191,7 @@ impl<'t> Stop<'t> {
         });
         let is_glued = last - first + 1 == unit.len();
         let ends_open = !self.is_kind(last, TokenKind::Word) && self.word(last) != "%";
-        (is_unit && is_glued && !ends_open && !RESERVED_WORDS.contains(&self.word(last)))
+        (is_unit && is_glued && !ends_open && !is_no_unit(self.word(last)))
             .then(|| (self.span(self.before[number]), self.span(first).to(self.span(last))))
     }
 

@@ -20,6 +20,7 @@ pub fn columns_of(words: &[&str]) -> Option<Columns> {
         "let" | "param" => ("value", vec![outside(words, "="), outside(words, "in"), doc(words)]),
         "species" => ("species", vec![doc(words).filter(|_| outside(words, ",").is_none())]),
         "data" => ("data", vec![outside(words, "="), doc(words)]),
+        "kernel" => ("kernel", vec![outside(words, "="), doc(words)]),
         "initial" => ("initial", vec![outside(words, "=")]),
         "measure" => ("measure", vec![outside(words, "=")]),
         "reference" if words.get(2) == Some(&"for") => ("reference", vec![Some(2), outside(words, "=")]),

@@ -17,6 +17,8 @@ const BEFORE_VALUE: &[&str] =
 const BEFORE_VALUE_IN: &[(&str, &[&str])] = &[
     ("species", &["retardation", "diffusion"]),
     ("medium", &["porosity"]),
+    ("exchange", &["bandwidth", "mixing_fraction", "cutoff", "diffusion_error"]),
+    ("kernel", &["support"]),
     ("dispersion", &["longitudinal", "transverse", "transverse_vertical", "molecular"]),
     ("flow", &["left", "right", "bottom", "top", "front", "back", "conductivity", "anisotropy"]),
 ];

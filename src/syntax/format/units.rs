@@ -5,7 +5,7 @@
 
 use crate::syntax::split::Lexed;
 use crate::syntax::tree::TokenKind;
-use crate::syntax::words::RESERVED_WORDS;
+use crate::syntax::words::is_no_unit;
 use crate::units::is_unit_symbol;
 
 /// Marks the tokens of `line` that are parts of units: `true` for each after a number.
@@ -56,7 +56,7 @@ fn part_tokens(lexed: Lexed, rest: &[usize], must_touch: bool) -> Option<usize> 
     let symbol = *rest.first()?;
     let word = lexed.slice(symbol);
     let is_symbol = matches!(word, "%" | "‰")
-        || lexed.kind(symbol) == Some(TokenKind::Word) && !RESERVED_WORDS.contains(&word);
+        || lexed.kind(symbol) == Some(TokenKind::Word) && !is_no_unit(word);
     if !is_symbol || (must_touch && !is_glued(lexed, symbol)) {
         return None;
     }

@@ -1,0 +1,101 @@
+//! The exchange of a plan in words.
+//!
+//! Owns these lines. May use the sizes that follow from the plan. It deliberately judges nothing: limits do.
+
+use super::exchange::{Exchange, Integration, Kernel, Sizes, lattice_error, plume_error};
+use super::limits::short;
+use super::{Placement, Plan};
+use crate::catalog::kernel;
+use crate::diagnostic::number;
+use crate::maths::scalar::pow;
+
+/// The error that a plume is asked about.
+const ASKED: f64 = 0.01;
+/// A leading error below this part of the step's own is rounding.
+const ROUNDING: f64 = 1e-9;
+
+/// Kernel, lengths, share, dispersion and errors; nothing without an exchange.
+pub(super) fn lines(plan: &Plan) -> Vec<String> {
+    let Some(exchange) = &plan.exchange else { return Vec::new() };
+    let sizes = exchange.sizes(plan, plan.time.step);
+    let mut lines = vec![
+        kernel_line(exchange, &sizes),
+        format!(
+            "bandwidth h = {} m: {} of the collocation length of {} m, {} of the distance of parcels of {} m",
+            short(sizes.bandwidth),
+            short(sizes.bandwidth / sizes.collocation),
+            short(sizes.collocation),
+            short(sizes.bandwidth / sizes.spacing),
+            short(sizes.spacing)
+        ),
+        format!(
+            "about {} neighbours within {} m ({} bandwidths)",
+            short(sizes.neighbours),
+            short(sizes.radius * sizes.bandwidth),
+            short(sizes.radius)
+        ),
+        format!(
+            "share exchanged in a step: {}; normalise {}, integrate {}",
+            short(sizes.share),
+            exchange.normalisation.word(),
+            exchange.integration.word()
+        ),
+        dispersion_line(plan, exchange),
+    ];
+    lines.extend(cutoff_line(exchange, &sizes));
+    lines.push(error_line(plan, exchange.integration, &sizes));
+    let is_gaussian = matches!(&exchange.kernel, Kernel::Catalogue(name) if name == "gaussian");
+    if plan.particles.placement == Placement::Ordered && is_gaussian {
+        lines.push(format!(
+            "sums over ordered parcels, while they rest: right to {} of a mode",
+            short(lattice_error(&sizes))
+        ));
+    }
+    lines
+}
+
+fn kernel_line(exchange: &Exchange, sizes: &Sizes) -> String {
+    let (name, equation, support) = match &exchange.kernel {
+        Kernel::Catalogue(name) => {
+            let item = kernel::find(name);
+            let equation = item.map_or("", |item| item.equation);
+            (name, equation, item.map_or(f64::INFINITY, |item| item.support))
+        }
+        Kernel::Profile { name, support, .. } => (name, "of the scene", *support),
+    };
+    let end = if sizes.radius < support { "cut off" } else { "ends" };
+    format!("kernel {name}: {equation}; {end} at q = {}", short(sizes.radius))
+}
+
+fn dispersion_line(plan: &Plan, exchange: &Exchange) -> String {
+    let exchanged: Vec<String> = exchange.diffusion.iter().map(|entry| number(*entry)).collect();
+    let walks = plan.walk.spread.iter().any(|entry| *entry != 0.0);
+    let rest = if walks { "the rest walks" } else { "nothing walks" };
+    format!("dispersion by exchange: lower triangle ({}) m^2/s; {rest}", exchanged.join(", "))
+}
+
+/// What the end of the kernel takes.
+fn cutoff_line(exchange: &Exchange, sizes: &Sizes) -> Option<String> {
+    let lost = 1.0 - sizes.fidelity;
+    // A profile that ends at zero loses nothing.
+    (lost > 1e-12).then(|| {
+        let is_back = if exchange.is_compensated { "which is given back" } else { "which is not given back" };
+        format!("its end takes {} of the dispersion, {is_back}", short(lost))
+    })
+}
+
+/// The standard deviation from which a plume is right to a hundredth, by the leading error of the step.
+fn error_line(plan: &Plan, integration: Integration, sizes: &Sizes) -> String {
+    let (d, time) = (plan.axes.len(), &plan.time);
+    let at_one = plume_error(sizes, integration, (d, time.duration, time.step), 1.0);
+    let step = 2.0 * sizes.diffusion * time.step;
+    let is_none = integration == Integration::Explicit
+        && (sizes.effective * sizes.effective - step).abs() <= ROUNDING * step;
+    if is_none {
+        return "no leading error of the step: h is the collocation length".to_owned();
+    }
+    format!(
+        "leading error of step and kernel: below 1 % for a plume whose standard deviation at the end is {} m or more",
+        short(pow(at_one / ASKED, 0.25))
+    )
+}

@@ -1,0 +1,14 @@
+//! An exchange of nothing goes: where all concentrations are the same everywhere, parcels have nothing to exchange.
+
+use super::Draft;
+
+pub(super) fn run(draft: &mut Draft) {
+    let carries = draft.plan.components.iter().any(|component| !component.is_immobile);
+    if carries {
+        return;
+    }
+    if draft.plan.exchange.take().is_some() {
+        draft.plan.stages.retain(|stage| *stage != crate::plan::Stage::Exchange);
+        draft.leave_out("exchange between parcels", "they carry nothing that differs from place to place");
+    }
+}
