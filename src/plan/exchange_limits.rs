@@ -7,7 +7,7 @@ use super::cost::Cost;
 use super::exchange::{Exchange, Integration, Sizes};
 use super::limits::{Limit, axis_name, round_down, short, short_up};
 use super::tape::Operation;
-use super::{Placement, Plan, Side, Stage};
+use super::{Placement, Plan, Stage};
 use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{N109, N110, N206, N207};
 use crate::maths::scalar::pow;
@@ -17,6 +17,8 @@ use crate::source::Span;
 /// Shares of a step beyond which no sum is taken: implicit and exponential steps need ever more of them.
 const MOST_IMPLICIT: f64 = 1e4;
 const MOST_EXPONENTIAL: f64 = 200.0;
+/// Rules of so many mean distances are rules of thumb: what a cut-off takes from a kernel is no reason to warn.
+const SLACK: f64 = 0.05;
 /// What rounding may add to a share of one.
 const ROUNDING: f64 = 1e-9;
 /// Neighbours of a parcel, and seconds of one core for one step, beyond which nobody waits.
@@ -62,7 +64,7 @@ pub(super) fn check(
 /// The least bandwidth in mean distances that sums over parcels are right at.
 ///
 /// - Equation: 1 for ordered parcels that rest, 1.5 for those that walk, 3 for random ones that rest in one dimension.
-/// - Symbols: of `h/s`, `s` the mean distance.
+/// - Symbols: of `κh/s`, `κh` the bandwidth of a Gaussian with the same leading error, `s` the mean distance.
 /// - Range: rules from trials of a plume; where others lie between these the one for walking parcels is taken.
 /// - Source: methods, sections 6.7 and 6.9.
 /// - Shape: one number.
@@ -88,8 +90,8 @@ impl Sized<'_> {
             ),
             limit(
                 "bandwidth against the distance of parcels",
-                "h / (V / N)^(1/d)",
-                sizes.bandwidth / sizes.spacing,
+                "kappa h / (V / N)^(1/d), kappa = 1 for a Gaussian",
+                sizes.effective / sizes.spacing,
                 "at least 1 for ordered parcels, 1.5 for those that walk, 3 for random ones that rest in one dimension",
             ),
             limit(
@@ -140,6 +142,9 @@ impl Sized<'_> {
         let mut ways = vec![format!("use a bandwidth of `{wider} m` or more")];
         if is_enough {
             ways.insert(0, format!("use `step {}` or less", round_down(shorter)));
+        } else {
+            let times = short_up(sizes.bandwidth * (sizes.share / most).sqrt() / sizes.collocation);
+            ways.push(format!("of `{times} * collocation`"));
         }
         if self.exchange.integration == Integration::Explicit {
             ways.push("integrate it as `implicit`".to_owned());
@@ -161,10 +166,14 @@ impl Sized<'_> {
     /// What brings the bandwidth up to what the parcels need.
     fn enough(&self) -> String {
         let (sizes, d) = (&self.sizes, self.plan.axes.len());
-        let least = least_bandwidths(self.plan);
+        let kappa = sizes.effective / sizes.bandwidth;
+        // A kernel that is all but a Gaussian counts as one.
+        let kappa = if (kappa - 1.0).abs() < SLACK { 1.0 } else { kappa };
+        let least = least_bandwidths(self.plan) / kappa;
         let wider = short_up(least * sizes.spacing);
         let more = self.plan.particles.count as f64 * pow(least * sizes.spacing / sizes.bandwidth, d as f64);
-        let length = format!("use a bandwidth of `{wider} m` or more, such as `{} * spacing`", short(least));
+        let length =
+            format!("use a bandwidth of `{wider} m` or more, such as `{} * spacing`", short_up(least));
         if self.reads_spacing() || more > 1e15 {
             return length;
         }
@@ -176,7 +185,10 @@ impl Sized<'_> {
         (reach < self.sizes.spacing * (1.0 - ROUNDING)).then(|| {
             Diagnostic::refused(N207, "the kernel reaches no neighbour")
                 .at(self.place, format!("it ends {} m away", short(reach)))
-                .also(self.scenario.particles.count_span, format!("parcels {} m apart", short(self.sizes.spacing)))
+                .also(
+                    self.scenario.particles.count_span,
+                    format!("parcels {} m apart", short(self.sizes.spacing)),
+                )
                 .found(format!("a reach of {} of the distance of parcels", short(reach / self.sizes.spacing)))
                 .expected("at least 1")
                 .help(self.enough())
@@ -215,12 +227,12 @@ impl Sized<'_> {
     }
 
     fn sparse(&self) -> Option<Diagnostic> {
-        let (found, least) = (self.sizes.bandwidth / self.sizes.spacing, least_bandwidths(self.plan));
-        (found < least * (1.0 - ROUNDING)).then(|| {
+        let (found, least) = (self.sizes.effective / self.sizes.spacing, least_bandwidths(self.plan));
+        (found < least * (1.0 - SLACK)).then(|| {
             Diagnostic::warning(N109, "the bandwidth is small for the distance of the parcels")
                 .at(self.place, format!("{} m", short(self.sizes.bandwidth)))
                 .also(self.scenario.particles.count_span, format!("parcels {} m apart", short(self.sizes.spacing)))
-                .found(format!("{} of the distance", short(found)))
+                .found(format!("{} of the distance, as a Gaussian", short(found)))
                 .expected(format!("at least {} for parcels that lie and move like these", short(least)))
                 .note("where parcels have few neighbours sums over them are no integrals: too little is exchanged")
                 .help(self.enough())
@@ -233,9 +245,7 @@ impl Sized<'_> {
         let (idx, reach) = (0..self.plan.axes.len()).find_map(|idx| {
             let axis = &self.plan.axes[idx];
             let reach = sizes.radius * sizes.bandwidth * (self.exchange.along(idx) / sizes.diffusion).sqrt();
-            let is_periodic = axis.low_side == Side::Periodic;
-            let room = (axis.high - axis.low) * if is_periodic { 0.5 } else { 1.0 };
-            (reach > room).then_some((idx, reach))
+            (reach > axis.high - axis.low).then_some((idx, reach))
         })?;
         let axis = &self.plan.axes[idx];
         let name = axis_name(axis.index);
@@ -244,8 +254,8 @@ impl Sized<'_> {
                 .at(self.place, format!("it reaches {} m", short(reach)))
                 .also(self.scenario.domain.span, format!("{} m long", short(axis.high - axis.low)))
                 .found(format!("a reach of {} m", short(reach)))
-                .expected("less than the domain, and less than half of one that is periodic")
-                .note("parcels exchange with all others, and sides decide what becomes of a plume")
+                .expected("less than the domain")
+                .note("parcels exchange with all others and their mirror images: sides decide what becomes of a plume")
                 .help("use a smaller bandwidth, a shorter step if it follows that, or a longer domain"),
         )
     }

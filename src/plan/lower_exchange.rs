@@ -64,13 +64,17 @@ pub(super) fn walking_part(scenario: &Scenario) -> f64 {
 }
 
 /// The part that is exchanged: lower triangle over the axes of the domain, m²/s.
-fn diffusion(scenario: &Scenario, written: &scenario::exchange::Exchange) -> Result<Vec<f64>, Vec<Diagnostic>> {
+fn diffusion(
+    scenario: &Scenario,
+    written: &scenario::exchange::Exchange,
+) -> Result<Vec<f64>, Vec<Diagnostic>> {
     let (_, tensor) = of_fluid(scenario);
     let axes = &scenario.domain.axes;
     let entry = |row: usize, column: usize| written.mixing_fraction * tensor[row][column];
     let rows = axes.iter().enumerate();
-    let triangle: Vec<f64> =
-        rows.flat_map(|(i, row)| axes[..=i].iter().map(move |column| entry(row.index, column.index))).collect();
+    let triangle: Vec<f64> = rows
+        .flat_map(|(i, row)| axes[..=i].iter().map(move |column| entry(row.index, column.index)))
+        .collect();
     let place = scenario.dispersion.as_ref().map_or(written.span, |dispersion| dispersion.span);
     if !triangle.iter().copied().all(f64::is_finite) {
         return Err(vec![
@@ -111,7 +115,9 @@ fn profile(kernel: &Written) -> Result<Tape, Box<Diagnostic>> {
             Diagnostic::refused(M037, format!("`{}` is no kernel: {what}", kernel.name))
                 .at(kernel.value.span, found.clone())
                 .found(found)
-                .expected("a profile that is finite, not negative, falls to its end and is flat at its middle")
+                .expected(
+                    "a profile that is finite, not negative, falls to its end and is flat at its middle",
+                )
                 .help(help),
         )
     };
@@ -122,11 +128,19 @@ fn profile(kernel: &Written) -> Result<Tape, Box<Diagnostic>> {
     let slack = ROUNDING * values.iter().fold(0.0, |largest: f64, value| largest.max(value.abs()));
     if let Some(k) = values.iter().position(|value| *value < -slack) {
         let found = format!("{} at q = {}", precise(values[k]), at(k));
-        return Err(refuse("it is below zero".into(), found, "what is exchanged would flow uphill there: end it before"));
+        return Err(refuse(
+            "it is below zero".into(),
+            found,
+            "what is exchanged would flow uphill there: end it before",
+        ));
     }
     if let Some(k) = (1..values.len()).find(|&k| values[k] > values[k - 1] + slack) {
         let found = format!("from {} to {} up to q = {}", precise(values[k - 1]), precise(values[k]), at(k));
-        return Err(refuse("it rises".into(), found, "what is exchanged would flow uphill there: let it fall"));
+        return Err(refuse(
+            "it rises".into(),
+            found,
+            "what is exchanged would flow uphill there: let it fall",
+        ));
     }
     if values[0] - values[N_POINTS] <= slack {
         let found = format!("{} everywhere", precise(values[0]));
@@ -135,7 +149,11 @@ fn profile(kernel: &Written) -> Result<Tape, Box<Diagnostic>> {
     let forces = NEAR.map(|share| of_tape(&tape, share * end).1);
     if let Some(force) = steep(forces) {
         let found = format!("-W'/q is {} at q = {}", precise(force), precise(NEAR[2] * end));
-        return Err(refuse("it has a tip".into(), found, "let the slope vanish at q = 0, as that of 1 - q^2 does"));
+        return Err(refuse(
+            "it has a tip".into(),
+            found,
+            "let the slope vanish at q = 0, as that of 1 - q^2 does",
+        ));
     }
     Ok(tape)
 }

@@ -304,9 +304,8 @@ fn own<'a>(checker: &mut Checker<'a>, written: &'a tree::Kernel) -> Option<Kerne
     checker.checked.insert(written.value.span, &written.value);
     let value = checker.check_with(&written.value, Allow::CONSTANT, &locals);
     let what = format!("the kernel `{}`", name.value);
-    let value = value.filter(|value| {
-        checker.expect_dimension(&written.value, value, &what, &[Dimension::NONE]).is_some()
-    });
+    let value = value
+        .filter(|value| checker.expect_dimension(&written.value, value, &what, &[Dimension::NONE]).is_some());
     let what = format!("the support of `{}`", name.value);
     let support = checker.slot(&written.support, &what, Dimension::NONE);
     let (value, support) = (value?, support?);

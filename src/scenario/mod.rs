@@ -46,7 +46,10 @@ use crate::units::Dimension;
 use expression::Expr;
 use transport::{Auto, Dispersion, Flow, Patch, Shares, Source};
 
-pub use choice::{Activity, Covariance, Integration, Integrator, Normalisation, OutputKind, Placement, Side, Splitting, Station};
+pub use choice::{
+    Activity, Covariance, Integration, Integrator, Normalisation, OutputKind, Placement, Side, Splitting,
+    Station,
+};
 pub use collect::resolve;
 pub use data_files::wanted_data;
 pub use geometry::MAX_BINS;

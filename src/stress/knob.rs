@@ -76,9 +76,7 @@ impl Knob {
                 kinetics.is_some_and(|kinetics| !half_saturations(&kinetics.laws.operations).is_empty())
             }
             Self::Equilibrium => equilibrium.is_some(),
-            Self::Peclet => {
-                plan.exchange.is_some() || plan.walk.spread.iter().any(|entry| *entry != 0.0)
-            }
+            Self::Peclet => plan.exchange.is_some() || plan.walk.spread.iter().any(|entry| *entry != 0.0),
             Self::Damkohler => {
                 (kinetics.is_some() || equilibrium.is_some()) && (is_moving || exchanges(plan))
             }

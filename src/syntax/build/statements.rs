@@ -10,9 +10,9 @@ use crate::source::{Span, Spanned};
 use crate::syntax::climb::Built;
 use crate::syntax::grammar::Rule;
 use crate::syntax::tree::{
-    self, Arrow, Assignment, Average, Axis, Count, Domain, Expr, ExprKind, Field, Function, Kernel, Let, Measure,
-    Output, Param, Particles, Qualifier, Rate, Reaction, Reference, Run, Species, StatementKind, Target,
-    Term, Times, UnaryOperator, Use, Zone,
+    self, Arrow, Assignment, Average, Axis, Count, Domain, Expr, ExprKind, Field, Function, Kernel, Let,
+    Measure, Output, Param, Particles, Qualifier, Rate, Reaction, Reference, Run, Species, StatementKind,
+    Target, Term, Times, UnaryOperator, Use, Zone,
 };
 use pest::iterators::Pair;
 

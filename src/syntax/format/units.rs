@@ -55,8 +55,8 @@ fn unit_tokens(lexed: Lexed, rest: &[usize]) -> usize {
 fn part_tokens(lexed: Lexed, rest: &[usize], must_touch: bool) -> Option<usize> {
     let symbol = *rest.first()?;
     let word = lexed.slice(symbol);
-    let is_symbol = matches!(word, "%" | "‰")
-        || lexed.kind(symbol) == Some(TokenKind::Word) && !is_no_unit(word);
+    let is_symbol =
+        matches!(word, "%" | "‰") || lexed.kind(symbol) == Some(TokenKind::Word) && !is_no_unit(word);
     if !is_symbol || (must_touch && !is_glued(lexed, symbol)) {
         return None;
     }
