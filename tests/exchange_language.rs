@@ -432,7 +432,7 @@ fn the_step_and_the_bandwidth_that_are_named_work() {
     );
     let refusal = following.diagnostics.iter().find(|told| told.code.0 == "N206").expect("below ℓ");
     assert!(
-        !refusal.help[0].contains("step") && refusal.help[0].contains("`1.01 * collocation`"),
+        !refusal.help[0].contains("step") && refusal.help[0].contains("or of `collocation`"),
         "{:?}",
         refusal.help
     );

@@ -38,6 +38,9 @@ pub enum Kernel {
     Profile { name: String, value: Tape, support: f64 },
 }
 
+/// `W` and `−W′/q` over q.
+pub type Profile<'e> = Box<dyn Fn(f64) -> (f64, f64) + 'e>;
+
 /// What follows from a plan for its exchange.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sizes {
@@ -70,7 +73,7 @@ struct Moments {
 
 impl Exchange {
     /// The profile and where it ends, however far.
-    pub fn profile(&self) -> (Box<dyn Fn(f64) -> (f64, f64) + '_>, f64) {
+    pub fn profile(&self) -> (Profile<'_>, f64) {
         match &self.kernel {
             Kernel::Catalogue(name) => {
                 let item: &Item = kernel::find(name).unwrap_or(&kernel::ALL[0]);

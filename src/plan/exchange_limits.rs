@@ -144,7 +144,10 @@ impl Sized<'_> {
             ways.insert(0, format!("use `step {}` or less", round_down(shorter)));
         } else {
             let times = short_up(sizes.bandwidth * (sizes.share / most).sqrt() / sizes.collocation);
-            ways.push(format!("of `{times} * collocation`"));
+            ways.push(match times.as_str() {
+                "1" => "of `collocation`".to_owned(),
+                times => format!("of `{times} * collocation`"),
+            });
         }
         if self.exchange.integration == Integration::Explicit {
             ways.push("integrate it as `implicit`".to_owned());

@@ -2,6 +2,7 @@
 
 use super::build_tape::build_reference;
 use super::evaluation::{self, Evaluation};
+use super::exchange::Exchange;
 use super::lower_chemistry::{self, Network};
 use super::lower_decay;
 use super::lower_exchange;
@@ -53,6 +54,7 @@ pub fn lower(scenario: &Scenario) -> Result<Lowered, Vec<Diagnostic>> {
         species,
         components,
         mixing: scenario.mixing.as_ref().map(lower_mixing),
+        stages: stages(exchange.as_ref()),
         exchange,
         reactions: scenario.reactions.iter().filter_map(lower_reaction).collect(),
         chemistry,
@@ -60,7 +62,6 @@ pub fn lower(scenario: &Scenario) -> Result<Lowered, Vec<Diagnostic>> {
         time: Time::new(scenario.run.duration, scenario.run.step),
         outputs: scenario.outputs.iter().map(lower_output).collect(),
         writes_flow: scenario.flow_table.is_some(),
-        stages: vec![Stage::Mix, Stage::Move, Stage::Bound, Stage::Average, Stage::Observe],
         seed: scenario.seed,
         axes,
     };
@@ -81,14 +82,17 @@ pub fn lower(scenario: &Scenario) -> Result<Lowered, Vec<Diagnostic>> {
             return Err(found);
         }
     }
-    if plan.exchange.is_some() {
-        plan.stages.insert(3, Stage::Exchange);
-    }
     method::choose(&mut plan);
     if plan.reacts_in_steps() {
         plan.stages.insert(1, Stage::React);
     }
     Ok((plan, evaluation, warnings))
+}
+
+/// A step as a scene without passes takes it.
+fn stages(exchange: Option<&Exchange>) -> Vec<Stage> {
+    let all = [Stage::Mix, Stage::Move, Stage::Bound, Stage::Exchange, Stage::Average, Stage::Observe];
+    all.into_iter().filter(|stage| *stage != Stage::Exchange || exchange.is_some()).collect()
 }
 
 /// Masses carry nothing beside their position, and walk by `transport` alone.

@@ -268,13 +268,9 @@ fn build<'a>(
     let chemistry = super::chemistry::chemistry(checker, statements);
     let motion = motion(checker, statements, domain.as_mut());
     let mixing = super::zones::mixing(checker, statements);
-    let kernels = super::exchange::kernels(checker, statements);
     let exchange = super::exchange::exchange(checker, statements);
     let bins = super::geometry::bins(checker, statements);
-    let particles = super::transport::masses::particles(checker, statements);
-    if let (Some(domain), Some(particles)) = (&domain, &particles) {
-        super::geometry::check_volume(checker, domain, particles);
-    }
+    let particles = particles(checker, statements, domain.as_ref());
     let run = super::model::run(checker, statements);
     let duration = run.as_ref().map(|run| run.duration);
     let sources = super::transport::source::sources(checker, statements, duration, domain.as_ref());
@@ -294,7 +290,7 @@ fn build<'a>(
     if !(are_outputs_right && are_references_right && is_analysis_right) {
         return None;
     }
-    let (medium, flow, dispersion) = motion?;
+    let ((medium, flow, dispersion), (exchange, kernels)) = (motion?, exchange?);
     let scenario = Scenario {
         title: statements.title.map(|title| title.value.clone()),
         citations: statements.citations.iter().map(|text| text.value.clone()).collect(),
@@ -310,8 +306,8 @@ fn build<'a>(
         dispersion,
         sources: sources?,
         mixing: mixing?,
-        exchange: exchange?,
-        kernels: kernels?,
+        exchange,
+        kernels,
         bins: bins?,
         particles: particles?,
         run: run?,
@@ -324,6 +320,19 @@ fn build<'a>(
     };
     check_together(checker, &scenario);
     Some(scenario)
+}
+
+/// Particles whose volume is a number.
+fn particles<'a>(
+    checker: &mut Checker<'a>,
+    statements: &Statements<'a>,
+    domain: Option<&Domain>,
+) -> Option<super::Particles> {
+    let particles = transport::masses::particles(checker, statements)?;
+    if let Some(domain) = domain {
+        super::geometry::check_volume(checker, domain, &particles);
+    }
+    Some(particles)
 }
 
 /// What only the whole scene shows.

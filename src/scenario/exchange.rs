@@ -103,11 +103,19 @@ const WORDS: &[(&str, Word)] = &[
     ("compensate", Word::Compensate),
 ];
 
-/// The exchange of a scene: `Some(None)` without the statement, `None` if something of it is wrong.
+/// The exchange of a scene, if it has one, and its kernels in the order of the text; `None` if something is wrong.
 pub(super) fn exchange<'a>(
     checker: &mut Checker<'a>,
     statements: &Statements<'a>,
-) -> Option<Option<Exchange>> {
+) -> Option<(Option<Exchange>, Vec<Kernel>)> {
+    let kernels: Vec<Option<Kernel>> =
+        statements.kernels.iter().map(|written| own(checker, written)).collect();
+    let exchange = statement(checker, statements);
+    Some((exchange?, kernels.into_iter().collect::<Option<_>>()?))
+}
+
+/// `Some(None)` without the statement.
+fn statement<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> Option<Option<Exchange>> {
     let Some((span, fields)) = statements.exchange else { return Some(None) };
     let bandwidth = Expr::leaf(Node::Axis(0), Dimension::LENGTH, span);
     let mut found = Exchange {
@@ -289,12 +297,6 @@ fn choice<T: Copy>(
             .expected(all.join(", ")),
     );
     None
-}
-
-/// The kernels of a scene, in the order of the text; `None` if one of them is wrong.
-pub(super) fn kernels<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> Option<Vec<Kernel>> {
-    let all: Vec<Option<Kernel>> = statements.kernels.iter().map(|written| own(checker, written)).collect();
-    all.into_iter().collect()
 }
 
 fn own<'a>(checker: &mut Checker<'a>, written: &'a tree::Kernel) -> Option<Kernel> {

@@ -66,7 +66,7 @@ fn masses_are_those_of_the_literature() {
     use std::f64::consts::PI;
     let surface = [2.0, 2.0 * PI, 4.0 * PI];
     for (name, constants) in [
-        ("gaussian", [1.0 / (2.0 * PI).sqrt(), 1.0 / (2.0 * PI), (2.0 * PI).powf(-1.5)]),
+        ("gaussian", [1.0 / (2.0 * PI).sqrt(), 1.0 / (2.0 * PI), 1.0 / (2.0 * PI * (2.0 * PI).sqrt())]),
         ("cubic_spline", [2.0 / 3.0, 10.0 / (7.0 * PI), 1.0 / PI]),
         ("quintic_spline", [1.0 / 120.0, 7.0 / (478.0 * PI), 1.0 / (120.0 * PI)]),
         ("wendland_c2", [f64::NAN, 7.0 / (4.0 * PI), 21.0 / (16.0 * PI)]),

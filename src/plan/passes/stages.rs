@@ -27,10 +27,7 @@ pub(super) fn run(draft: &mut Draft) {
         ));
     }
     if !moves {
-        notes.push(match plan.exchange {
-            None => ("moving particles", "neither flow in the frame nor dispersion"),
-            Some(_) => ("moving particles", "no flow in the frame, and all dispersion is exchange"),
-        });
+        notes.push(("moving particles", why_still(plan)));
     }
     if !observes {
         notes.push(("observation", "no outputs"));
@@ -73,6 +70,13 @@ pub(super) fn run(draft: &mut Draft) {
     draft.plan.stages = stages;
     for (what, why) in notes {
         draft.leave_out(what, why);
+    }
+}
+
+fn why_still(plan: &Plan) -> &'static str {
+    match plan.exchange {
+        None => "neither flow in the frame nor dispersion",
+        Some(_) => "no flow in the frame, and all dispersion is exchange",
     }
 }
 
