@@ -192,7 +192,7 @@ fn collocation_lengths_follow_the_variance_of_the_kernel() {
     for (kernel, expected) in variances {
         for (text, variance) in [LINE, RECT, BOX].into_iter().zip(expected) {
             let compiled =
-                of(text, &format!("exchange kernel {kernel}, bandwidth 4 * spacing, integrate implicit"));
+                of(text, &format!("exchange kernel {kernel}, bandwidth 3 * spacing, integrate implicit"));
             let own = sizes(&compiled);
             let step = (2.0 * own.diffusion * compiled.plan.time.step).sqrt();
             if variance.is_finite() {

@@ -158,9 +158,8 @@ fn own_values(plan: &Plan, n_values: f64) -> f64 {
 fn exchange_cost(plan: &Plan, n_values: f64) -> f64 {
     let Some(exchange) = &plan.exchange else { return 0.0 };
     let sizes = exchange.sizes(plan, plan.time.step);
-    let neighbours = sizes.neighbours.min(plan.particles.count as f64);
     let sums = exchange.sums(sizes.share);
-    table::SORT + sums * (table::PARCEL + neighbours * (table::PAIR + table::PAIR_VALUE * n_values))
+    table::SORT + sums * (table::PARCEL + sizes.neighbours * (table::PAIR + table::PAIR_VALUE * n_values))
 }
 
 /// Nanoseconds per particle and step of a walk along tracks.

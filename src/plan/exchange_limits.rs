@@ -44,7 +44,7 @@ pub(super) fn check(
     diagnostics: &mut Vec<Diagnostic>,
 ) {
     let (Some(exchange), Some(written)) = (&plan.exchange, &scenario.exchange) else { return };
-    let sizes = exchange.sizes(plan, plan.time.step);
+    let sizes = exchange.sizes(plan, step(plan));
     let sized = Sized { scenario, plan, exchange, sizes, place: written.bandwidth.span };
     let numbers = [sizes.bandwidth, sizes.spacing, sizes.share, sizes.neighbours, sizes.collocation];
     if !numbers.into_iter().all(|number| number > 0.0 && number.is_finite()) {
@@ -59,6 +59,11 @@ pub(super) fn check(
         diagnostics.extend(sized.sparse());
         diagnostics.extend(sized.wide());
     }
+}
+
+/// The longest step that is taken, s.
+fn step(plan: &Plan) -> f64 {
+    plan.time.step.min(plan.time.duration)
 }
 
 /// The least bandwidth in mean distances that sums over parcels are right at.
@@ -127,7 +132,7 @@ impl Sized<'_> {
     }
 
     fn too_large_share(&self) -> Option<Diagnostic> {
-        let (sizes, most, step) = (&self.sizes, self.most(), self.plan.time.step);
+        let (sizes, most, step) = (&self.sizes, self.most(), step(self.plan));
         if sizes.share <= most * (1.0 + ROUNDING) {
             return None;
         }
@@ -199,14 +204,14 @@ impl Sized<'_> {
     }
 
     fn too_many(&self) -> Option<Diagnostic> {
-        let (sizes, count) = (&self.sizes, self.plan.particles.count);
-        let neighbours = sizes.neighbours.min(count as f64);
-        (neighbours > MOST_NEIGHBOURS).then(|| {
+        // Those in images behind the sides are summed as well.
+        let sizes = &self.sizes;
+        (sizes.neighbours > MOST_NEIGHBOURS).then(|| {
             let share = pow(MOST_NEIGHBOURS / sizes.neighbours, 1.0 / self.plan.axes.len() as f64);
             Diagnostic::refused(N207, "each parcel would exchange with too many others")
                 .at(self.place, format!("it reaches {} m", short(sizes.radius * sizes.bandwidth)))
                 .also(self.scenario.particles.count_span, format!("parcels {} m apart", short(sizes.spacing)))
-                .found(format!("{} neighbours of each", short(neighbours)))
+                .found(format!("{} neighbours of each", short(sizes.neighbours)))
                 .expected(format!("at most {}", short(MOST_NEIGHBOURS)))
                 .help(format!(
                     "use a bandwidth of {} m or less, an earlier `cutoff`, a shorter step if it follows that, or fewer \

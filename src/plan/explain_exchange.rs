@@ -17,7 +17,8 @@ const ROUNDING: f64 = 1e-9;
 /// Kernel, lengths, share, dispersion and errors; nothing without an exchange.
 pub(super) fn lines(plan: &Plan) -> Vec<String> {
     let Some(exchange) = &plan.exchange else { return Vec::new() };
-    let sizes = exchange.sizes(plan, plan.time.step);
+    let step = plan.time.step.min(plan.time.duration);
+    let sizes = exchange.sizes(plan, step);
     let mut lines = vec![
         kernel_line(exchange, &sizes),
         format!(
@@ -87,8 +88,9 @@ fn cutoff_line(exchange: &Exchange, sizes: &Sizes) -> Option<String> {
 /// The standard deviation from which a plume is right to a hundredth, by the leading error of the step.
 fn error_line(plan: &Plan, integration: Integration, sizes: &Sizes) -> String {
     let (d, time) = (plan.axes.len(), &plan.time);
-    let at_one = plume_error(sizes, integration, (d, time.duration, time.step), 1.0);
-    let step = 2.0 * sizes.diffusion * time.step;
+    let dt = time.step.min(time.duration);
+    let at_one = plume_error(sizes, integration, (d, time.duration, dt), 1.0);
+    let step = 2.0 * sizes.diffusion * dt;
     let is_none = integration == Integration::Explicit
         && (sizes.effective * sizes.effective - step).abs() <= ROUNDING * step;
     if is_none {
