@@ -2,7 +2,6 @@
 
 #![allow(clippy::print_stdout)] // What a bench is for.
 
-#[allow(dead_code)]
 #[path = "../tests/support/mod.rs"]
 mod support;
 

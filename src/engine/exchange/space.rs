@@ -3,11 +3,13 @@
 //! Owns the map to it, the cells that order particles there, and the images of sides. May use the plan's words. It
 //! deliberately holds no particle.
 
+#![allow(clippy::needless_range_loop)] // Zipped iterators are not always inlined; these loops are hot.
+
 use crate::plan::exchange::determinant;
 use crate::plan::{Axis, Side};
 
 /// Cells within a radius: across rows, and along them, where ranges are cut closely.
-const ACROSS: f64 = 2.0;
+const ACROSS: f64 = 1.0;
 const ALONG: f64 = 8.0;
 
 /// Added to ranges, over the radius: rounding must not cut off what is just within it.
