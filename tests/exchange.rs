@@ -1,6 +1,5 @@
 //! Parcels that exchange what they carry, against closed forms and against sums that are written out.
 
-#[allow(dead_code)]
 mod support;
 
 use lamella::engine::Settings;
