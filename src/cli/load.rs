@@ -66,6 +66,12 @@ fn read_used(scene: &Path, path: &str) -> Result<String, (String, bool)> {
     read_scene(&file).map_err(|stopped| (stopped.message.message.clone(), false))
 }
 
+/// Names of all sweeps of a scene, right or wrong.
+pub(crate) fn names_of_sweeps(path: &Path) -> Result<Vec<String>, Stopped> {
+    let (file, _) = lamella::syntax::parse(FileId(0), &read_scene(path)?);
+    Ok(sweeps(&file).map(|sweep| sweep.name.value.clone()).collect())
+}
+
 /// `--over AXIS=VALUES`: a sweep without a statement.
 pub(crate) struct Over<'a> {
     pub(crate) axes: &'a [String],

@@ -15,12 +15,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-/// Run all points of a sweep; what is there already is not run again
-#[derive(clap::Args)]
+/// Run all points of a sweep, or of all sweeps of a scene; what is there already is not run again
+#[derive(clap::Args, Clone)]
 pub(crate) struct Arguments {
     /// Scene file
     file: PathBuf,
-    /// Name of the sweep, if the scene has several
+    /// Name of the sweep, if the scene has several [default: one after another]
     name: Option<String>,
     /// Sweep an axis without a `sweep` statement, such as step=1s,2s,4s
     #[arg(long, value_name = "AXIS=VALUES")]
@@ -28,7 +28,7 @@ pub(crate) struct Arguments {
     /// Replicates of each point, with --over
     #[arg(long, value_name = "N", requires = "over")]
     replicates: Option<u32>,
-    /// Folder of the results [default: results/<scene>-<sweep>]
+    /// Folder of the results; of several sweeps, of a folder for each [default: results/<scene>-<sweep>]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Set a parameter at every point, such as v=2cm/s
@@ -74,6 +74,36 @@ impl Arguments {
 }
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
+    if arguments.name.is_none() && arguments.over.is_empty() && !super::files::is_stdin(&arguments.file) {
+        let names = load::names_of_sweeps(&arguments.file)?;
+        if names.len() > 1 {
+            return run_all(arguments, &names, terminal);
+        }
+    }
+    run_one(arguments, terminal)
+}
+
+/// All sweeps of a scene, one after another: points that fail are no reason to leave the next sweep out, but an end of
+/// the user's or of the disk is.
+fn run_all(arguments: &Arguments, names: &[String], terminal: &Terminal) -> CommandResult {
+    let mut worst = Exit::Done;
+    for name in names {
+        terminal.remark(&format!("sweep `{name}`"));
+        let out = arguments.out.as_ref().map(|out| out.join(name));
+        let own = Arguments { name: Some(name.clone()), out, ..arguments.clone() };
+        match run_one(&own, terminal)? {
+            Exit::Done => {}
+            Exit::SceneWrong => return Ok(Exit::SceneWrong),
+            other => worst = other,
+        }
+        if worst != Exit::Done && arguments.fail_fast {
+            break;
+        }
+    }
+    Ok(worst)
+}
+
+fn run_one(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
     let interrupt = Interrupt::listen();
     let over = (!arguments.over.is_empty())
         .then(|| load::Over { axes: &arguments.over, replicates: arguments.replicates });

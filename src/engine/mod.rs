@@ -19,6 +19,7 @@ mod observe;
 mod parallel;
 mod place;
 mod program;
+mod quasi;
 mod react;
 mod reactions;
 mod run;

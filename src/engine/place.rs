@@ -3,8 +3,9 @@
 //! Owns the strata and the first positions. May use `state` and the plan's words. It deliberately
 //! reads no initial values.
 
+use super::quasi::Quasi;
 use crate::maths::wide::Width;
-use crate::plan::{Axis, Placement};
+use crate::plan::{Axis, Placement, Side};
 use crate::state::particles::{Block, CHUNK};
 use crate::state::stream::{Purpose, Stream};
 
@@ -66,15 +67,16 @@ fn root(x: f64, n: usize) -> f64 {
 /// Fills the positions of a block.
 pub fn place<const D: usize>(
     axes: &[Axis],
-    placement: Placement,
+    (placement, disorder): (Placement, f64),
     strata: &Strata<D>,
     seed: u64,
     block: &mut Block<D>,
 ) {
     let stream = Stream::new(seed, Purpose::Placement);
+    let quasi = Quasi::new(&stream);
     let mut uniforms = [[0.5; CHUNK]; D];
     for (chunk_idx, range) in block.chunks().enumerate() {
-        if placement != Placement::Ordered {
+        if matches!(placement, Placement::Random | Placement::Stratified) || disorder > 0.0 {
             for (axis, uniforms) in uniforms.iter_mut().enumerate() {
                 stream.uniforms(Width::widest(), block.idx, (chunk_idx * D + axis) as u64, uniforms);
             }
@@ -83,10 +85,16 @@ pub fn place<const D: usize>(
             let particle = block.first() + particle_idx as u64;
             let uniform = std::array::from_fn(|axis| uniforms[axis][idx]);
             let position = match placement {
-                Placement::Random => std::array::from_fn(|axis| {
-                    axes[axis].low + uniform[axis] * (axes[axis].high - axes[axis].low)
-                }),
+                Placement::Random => across(axes, uniform),
+                Placement::LowDiscrepancy => across(axes, quasi.point(particle)),
                 Placement::Stratified => inside(strata, particle, uniform),
+                Placement::Ordered if disorder > 0.0 => {
+                    let place = centre(strata, particle);
+                    std::array::from_fn(|axis| {
+                        let beside = disorder * (uniform[axis] - 0.5) * strata.width[axis];
+                        folded(&axes[axis], place[axis] + beside)
+                    })
+                }
                 Placement::Ordered => centre(strata, particle),
             };
             for axis in 0..D {
@@ -94,6 +102,19 @@ pub fn place<const D: usize>(
             }
         }
     }
+}
+
+/// The place of a point of the unit cube in the domain.
+fn across<const D: usize>(axes: &[Axis], uniform: [f64; D]) -> [f64; D] {
+    std::array::from_fn(|axis| axes[axis].low + uniform[axis] * (axes[axis].high - axes[axis].low))
+}
+
+/// What lies beyond a side is mirrored there, or comes in again at the other one.
+fn folded(axis: &Axis, x: f64) -> f64 {
+    let length = axis.high - axis.low;
+    let turn = if axis.low_side == Side::Periodic { length } else { 2.0 * length };
+    let within = (x - axis.low).rem_euclid(turn);
+    axis.low + if within > length { turn - within } else { within }
 }
 
 fn inside<const D: usize>(strata: &Strata<D>, particle: u64, uniform: [f64; D]) -> [f64; D] {
@@ -113,7 +134,6 @@ fn centre<const D: usize>(strata: &Strata<D>, particle: u64) -> [f64; D] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plan::Side;
 
     fn axis(index: usize, length: f64) -> Axis {
         Axis {

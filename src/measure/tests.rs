@@ -18,7 +18,7 @@ fn plan(axes: Vec<Axis>, outputs: Vec<Output>) -> Plan {
         numerics: NUMERICS_VERSION,
         axes,
         walk: Walk { drift: vec![], spread: vec![], normals: Normals::Single },
-        particles: Particles { count: 10, placement: Placement::Random, volume: 1.0 },
+        particles: Particles { count: 10, placement: Placement::Random, disorder: 0.0, volume: 1.0 },
         species: vec![],
         components: vec![],
         mixing: None,

@@ -76,8 +76,9 @@ fn step(plan: &Plan) -> f64 {
 pub(super) fn least_bandwidths(plan: &Plan) -> f64 {
     let rests = plan.walk.spread.iter().all(|entry| *entry == 0.0);
     match plan.particles.placement {
-        Placement::Ordered if rests => 1.0,
+        Placement::Ordered if rests && plan.particles.disorder == 0.0 => 1.0,
         Placement::Random if rests && plan.axes.len() == 1 => 3.0,
+        Placement::Ordered if rests && plan.axes.len() == 1 && plan.particles.disorder > 2.0 => 3.0,
         _ => 1.5,
     }
 }

@@ -58,10 +58,15 @@ pub fn grouped(value: u64) -> String {
 fn scene_lines(plan: &Plan) -> Vec<String> {
     let mut lines = vec![
         format!(
-            "{} {} particles, {:?} placement, seed {}",
+            "{} {} particles, {} placement{}, seed {}",
             grouped(plan.particles.count),
             if plan.carries_mass() { "mass" } else { "fluid" },
-            plan.particles.placement,
+            plan.particles.placement.word(),
+            if plan.particles.disorder > 0.0 {
+                format!(" with disorder {}", number(plan.particles.disorder))
+            } else {
+                String::new()
+            },
             plan.seed
         )
         .to_lowercase(),

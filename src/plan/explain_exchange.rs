@@ -46,7 +46,8 @@ pub(super) fn lines(plan: &Plan) -> Vec<String> {
     lines.extend(cutoff_line(exchange, &sizes));
     lines.push(error_line(plan, exchange.integration, &sizes));
     let is_gaussian = matches!(&exchange.kernel, Kernel::Catalogue(name) if name == "gaussian");
-    if plan.particles.placement == Placement::Ordered && is_gaussian {
+    let is_ordered = plan.particles.placement == Placement::Ordered && plan.particles.disorder == 0.0;
+    if is_ordered && is_gaussian {
         lines.push(format!(
             "sums over ordered parcels, while they rest: right to {} of a mode",
             short(lattice_error(&sizes))

@@ -49,6 +49,7 @@ pub fn lower(scenario: &Scenario) -> Result<Lowered, Vec<Diagnostic>> {
         particles: Particles {
             count: scenario.particles.count,
             placement: scenario.particles.placement,
+            disorder: scenario.particles.disorder,
             volume: volume / scenario.particles.count as f64,
         },
         species,

@@ -35,7 +35,10 @@ pub(super) fn exchange(scenario: &Scenario) -> Result<Option<Exchange>, Vec<Diag
     if !problems.is_empty() {
         return Err(problems);
     }
-    let Some(written) = &scenario.exchange else { return Ok(None) };
+    // What mixes nothing is a plain walk; `compile` says so.
+    let Some(written) = scenario.exchange.as_ref().filter(|written| written.mixing_fraction > 0.0) else {
+        return Ok(None);
+    };
     let Some(bandwidth) = build_tape(&written.bandwidth.value, &[]) else {
         return Err(vec![too_large(written.bandwidth.span)]);
     };

@@ -123,10 +123,17 @@ pub enum Normals {
     Double,
 }
 
+fn is_none(disorder: &f64) -> bool {
+    *disorder == 0.0
+}
+
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Particles {
     pub count: u64,
     pub placement: Placement,
+    /// Of ordered ones: each lies up to half of this, in their distances, from its place along every axis.
+    #[serde(default, skip_serializing_if = "is_none")]
+    pub disorder: f64,
     /// Fluid volume of one particle: m, m² or m³ over the axes of the scene (an axis that was left
     /// out still counts with its length).
     pub volume: f64,

@@ -30,6 +30,8 @@ pub enum Shape {
     Square,
     Triangle,
     Diamond,
+    /// Around another one, to point it out; no shape of a series.
+    Ring,
 }
 
 impl Shape {
@@ -40,6 +42,20 @@ impl Shape {
             Self::Circle => canvas.dot((x, y), 3.2, pen),
             Self::Square => canvas.rectangle((x - 2.9, y - 2.9), (x + 2.9, y + 2.9), pen),
             Self::Triangle => canvas.area(&[(x, y - 4.0), (x + 3.8, y + 2.8), (x - 3.8, y + 2.8)], pen),
+            Self::Ring => {
+                // Twelve corners of a circle of 6 pixels.
+                const CORNERS: [(f64, f64); 4] = [(6.0, 0.0), (5.196, 3.0), (3.0, 5.196), (0.0, 6.0)];
+                let quarter = |turn: fn((f64, f64)) -> (f64, f64)| CORNERS.map(turn);
+                let circle = [
+                    quarter(|(a, b)| (a, b)),
+                    quarter(|(a, b)| (-b, a)),
+                    quarter(|(a, b)| (-a, -b)),
+                    quarter(|(a, b)| (b, -a)),
+                ];
+                let points: Vec<(f64, f64)> =
+                    circle.concat().iter().map(|(dx, dy)| (x + dx, y + dy)).collect();
+                canvas.line(&points, pen);
+            }
             Self::Diamond => canvas.area(&[(x, y - 4.3), (x + 4.3, y), (x, y + 4.3), (x - 4.3, y)], pen),
         }
     }

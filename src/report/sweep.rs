@@ -56,7 +56,7 @@ pub struct SweepReport {
     pub kind: SweepReportKind,
     /// Name of the measure, which is its column in `points.parquet`.
     pub measure: String,
-    /// Of work–precision `wall_time`, `cpu_time` or a measure; of convergence axes.
+    /// Of work–precision `wall_time`, `cpu_time` or a measure; of convergence and minimum axes.
     pub against: Vec<String>,
     /// Axes that tell series apart.
     pub by: Vec<String>,
@@ -67,6 +67,7 @@ pub struct SweepReport {
 pub enum SweepReportKind {
     WorkPrecision,
     Convergence,
+    Minimum,
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -51,10 +51,23 @@ pub enum Placement {
     Stratified,
     /// Centres of the strata, no randomness.
     Ordered,
+    /// A sequence that fills the domain more evenly than chance, moved by the seed.
+    LowDiscrepancy,
 }
 
-pub(super) const PLACEMENTS: &[(&str, Placement)] =
-    &[("stratified", Placement::Stratified), ("random", Placement::Random), ("ordered", Placement::Ordered)];
+impl Placement {
+    /// As scenes have it.
+    pub fn word(self) -> &'static str {
+        PLACEMENTS.iter().find(|(_, placement)| *placement == self).map_or("", |(word, _)| word)
+    }
+}
+
+pub(super) const PLACEMENTS: &[(&str, Placement)] = &[
+    ("stratified", Placement::Stratified),
+    ("random", Placement::Random),
+    ("ordered", Placement::Ordered),
+    ("low_discrepancy", Placement::LowDiscrepancy),
+];
 
 /// The order in which transport and reaction take turns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -70,7 +70,7 @@ impl Default for Cutoff {
 }
 
 /// Radii that a kernel may be cut off at, in bandwidths.
-pub const CUTOFFS: RangeInclusive<f64> = 1.0..=8.0;
+pub const CUTOFFS: RangeInclusive<f64> = 1.0..=10.0;
 /// Errors of the dispersion that a radius may be chosen by.
 const ERRORS: RangeInclusive<f64> = 1e-12..=0.1;
 /// Bandwidths that a kernel of a scene may be long.
@@ -211,8 +211,8 @@ fn within<'a>(
 fn fraction<'a>(checker: &mut Checker<'a>, written: &'a tree::Expr) -> Option<f64> {
     let what = "the part of the dispersion that mixes";
     let value = checker.slot(written, what, Dimension::NONE)?;
-    let is_fine = value.value > 0.0 && value.value <= 1.0;
-    checker.require(is_fine, what, precise(value.value), "above 0, at most 1", value.span)?;
+    let is_fine = (0.0..=1.0).contains(&value.value);
+    checker.require(is_fine, what, precise(value.value), "from 0 to 1", value.span)?;
     Some(value.value)
 }
 

@@ -263,6 +263,8 @@ pub struct Particles {
     pub count: u64,
     pub count_span: Span,
     pub placement: Placement,
+    /// Of ordered ones: how far each may lie from its place, in their distances.
+    pub disorder: f64,
     /// Of particles that carry mass; absent for fluid.
     pub shares: Option<Shares>,
 }

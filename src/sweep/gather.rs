@@ -372,6 +372,7 @@ fn report(report: &Report) -> SweepReport {
         kind: match report.kind {
             ReportKind::WorkPrecision => SweepReportKind::WorkPrecision,
             ReportKind::Convergence => SweepReportKind::Convergence,
+            ReportKind::Minimum => SweepReportKind::Minimum,
         },
         measure: report.measure.clone(),
         against: report.against.clone(),

@@ -266,6 +266,8 @@ pub struct Particles {
     pub count: Count,
     /// A catalogue name: `stratified`, `random`.
     pub placement: Option<Name>,
+    /// `disorder 0.3`, after the placement.
+    pub disorder: Option<Expr>,
 }
 
 #[derive(Debug, Clone, PartialEq)]

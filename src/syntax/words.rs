@@ -101,6 +101,7 @@ pub fn clause_words(keyword: &str) -> &'static [&'static str] {
             "compensate",
         ],
         "kernel" => &["support"],
+        "particles" => &["disorder"],
         "mixing" => &["zones", "fraction", "rate"],
         "run" => &["to", "step"],
         "output" => &["at", "every", "along", "on", "in", "resident", "flux_weighted"],

@@ -82,7 +82,12 @@ fn a_sweep_runs_the_scene_that_it_is_of() {
                  measure mass_coarse = mean(coarse.total.A)\nmeasure mass_fine = mean(fine.total.A)\n\
                  sweep one of coarse { step 1 s, 2 s }\nsweep two of fine { fine.D 1e-9 m^2/s, 2e-9 m^2/s }\n";
     folder.write("scene.lam", scene);
-    folder.lamella(&["sweep", "scene.lam"]).exits(2).says("[F120]").says("`one`, `two`");
+    folder.lamella(&["sweep", "scene.lam", "three"]).exits(2).says("[F120]").says("`one`, `two`");
+    folder.lamella(&["sweep", "scene.lam", "--out", "both"]).exits(0).says("sweep `one`").says("sweep `two`");
+    for name in ["one", "two"] {
+        let path = folder.path(&format!("both/{name}/points.parquet"));
+        assert_eq!(lamella::table::read::points(&path).map_or(0, |points| points.len()), 2);
+    }
     for (name, particles, measure) in [("one", 1000, "mass_coarse"), ("two", 2000, "mass_fine")] {
         folder.lamella(&["sweep", "scene.lam", name, "--out", name, "-q"]).exits(0);
         let path = folder.path(&format!("{name}/points.parquet"));

@@ -1,6 +1,8 @@
 //! Plans built by hand, for tests and benches of the engine.
 #![allow(dead_code)]
 
+pub mod parcels;
+
 use lamella::engine::snapshot::{Outcome, Snapshot};
 use lamella::engine::{self, RunError, Settings, Unattended};
 use lamella::plan::tape::{Binary, Operation, Tape};
@@ -63,6 +65,7 @@ pub fn front(n_particles: u64, bins: usize, duration: f64, step: f64) -> Plan {
         particles: Particles {
             count: n_particles,
             placement: Placement::Stratified,
+            disorder: 0.0,
             volume: 2.0 * HALF_LENGTH / n_particles as f64,
         },
         species: vec![
@@ -109,6 +112,7 @@ pub fn plain(axes: Vec<Axis>, walk: Walk, n_particles: u64, duration: f64, step:
         particles: Particles {
             count: n_particles,
             placement: Placement::Stratified,
+            disorder: 0.0,
             volume: size / n_particles as f64,
         },
         species: vec![species("A", 0.0, vec![(0, 1.0)])],

@@ -7,7 +7,7 @@ use super::parts::{Part, Shape};
 use super::place::{Cells, Place};
 use super::release::Sampling;
 use super::world::Site;
-use crate::plan::Placement;
+use crate::state::stream::{Purpose, Stream};
 
 impl<const D: usize> Site<'_, D> {
     pub fn initial(&self, population: usize) -> Result<Part<D>, RunError> {
@@ -17,11 +17,8 @@ impl<const D: usize> Site<'_, D> {
             let values = self.evaluate(&of.initial, centres, 0.0);
             porosity.iter().zip(values).map(|(porosity, c)| porosity * of.retardation * c).collect()
         });
-        let sampling = match self.plan.particles.placement {
-            Placement::Random => Sampling::Random,
-            Placement::Stratified => Sampling::Stratified,
-            Placement::Ordered => Sampling::Ordered,
-        };
+        let stream = Stream::new(self.plan.seed, Purpose::Placement);
+        let sampling = Sampling::new(&self.plan.particles, &stream);
         Ok(Part {
             door: 0,
             mass: cells.total(),

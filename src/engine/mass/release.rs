@@ -2,11 +2,13 @@
 //!
 //! Owns the schedule of an origin. May use places, paces and draws. It deliberately moves nothing.
 
+use super::super::quasi::Quasi;
 use super::entry::Entry;
 use super::flock;
 use super::pace::Pace;
 use super::parts::Deep;
 use super::place::{Faces, Place};
+use crate::plan::{Particles, Placement};
 use crate::plan::tape::Tape;
 use crate::state::stream::Stream;
 use std::ops::Range;
@@ -49,11 +51,13 @@ pub enum Kind<const D: usize> {
 }
 
 /// How shares of a mass are drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Sampling {
     Random,
     Stratified,
-    Ordered,
+    /// At their places, or beside them by so many of their distances.
+    Ordered(f64),
+    LowDiscrepancy(Quasi),
 }
 
 /// One step of time.
@@ -83,7 +87,8 @@ impl<const D: usize> Release<D> {
         let born = |count: u64| {
             let id = flock::id(self.origin, count);
             let uniforms = stream.uniforms_of(id, 0);
-            let position = self.place.at(sampling.share(count, n, &uniforms), &uniforms);
+            let (share, uniforms) = sampling.draw(count, n, uniforms);
+            let position = self.place.at(share, &uniforms);
             Birth { id, population: self.population, position, entered: 0.0 }
         };
         counts.map(born).collect()
@@ -100,7 +105,8 @@ impl<const D: usize> Release<D> {
                 }
                 let last = if to > from { None } else { Some(*n) };
                 self.spread(stream, window, (*n, last), share, births, |along, count, uniforms| {
-                    let position = self.place.at(sampling.share(count, *n, uniforms), uniforms);
+                    let (share, uniforms) = sampling.draw(count, *n, *uniforms);
+                    let position = self.place.at(share, &uniforms);
                     (time(along), position)
                 });
             }
@@ -226,12 +232,32 @@ impl<const D: usize> Release<D> {
 }
 
 impl Sampling {
-    /// Share of the mass that comes before a particle.
-    pub fn share(self, count: u64, n: u64, uniforms: &[f64; 8]) -> f64 {
-        match self {
+    pub fn new(particles: &Particles, stream: &Stream) -> Self {
+        match particles.placement {
+            Placement::Random => Self::Random,
+            Placement::Stratified => Self::Stratified,
+            Placement::Ordered => Self::Ordered(particles.disorder),
+            Placement::LowDiscrepancy => Self::LowDiscrepancy(Quasi::new(stream)),
+        }
+    }
+
+    /// Share of the mass that comes before a particle, and the numbers that place it there.
+    pub fn draw(self, count: u64, n: u64, mut uniforms: [f64; 8]) -> (f64, [f64; 8]) {
+        let share = match self {
             Self::Random => uniforms[7],
             Self::Stratified => (count as f64 + uniforms[7]) / n as f64,
-            Self::Ordered => (count as f64 + 0.5) / n as f64,
-        }
+            Self::Ordered(disorder) => {
+                let place = (count as f64 + 0.5 + disorder * (uniforms[7] - 0.5)) / n as f64;
+                // Beyond either end it is mirrored.
+                let turned = place.rem_euclid(2.0);
+                if turned > 1.0 { 2.0 - turned } else { turned }
+            }
+            Self::LowDiscrepancy(quasi) => {
+                let [share, x, y, z] = quasi.point(count);
+                uniforms[..3].copy_from_slice(&[x, y, z]);
+                share
+            }
+        };
+        (share, uniforms)
     }
 }

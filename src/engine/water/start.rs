@@ -6,7 +6,7 @@ use super::super::mass::place::Cells;
 use super::super::mass::release::Sampling;
 use super::super::mass::world::Site;
 use crate::plan::tape::Operation;
-use crate::plan::{Placement, Plan};
+use crate::plan::Plan;
 use crate::state::grid::Grid;
 use crate::state::particles::Block;
 use crate::state::stream::{Purpose, Stream};
@@ -41,16 +41,13 @@ pub fn uneven<const D: usize>(cells: &Cells<D>, grid: &Grid<D>) -> Vec<f64> {
 
 /// Positions of the parcels of a block.
 pub fn place<const D: usize>(plan: &Plan, cells: &Cells<D>, block: &mut Block<D>) {
-    let sampling = match plan.particles.placement {
-        Placement::Random => Sampling::Random,
-        Placement::Stratified => Sampling::Stratified,
-        Placement::Ordered => Sampling::Ordered,
-    };
     let stream = Stream::new(plan.seed, Purpose::Placement);
+    let sampling = Sampling::new(&plan.particles, &stream);
     for idx in 0..block.n_particles {
         let count = block.number(idx);
         let uniforms = stream.uniforms_of(count, 0);
-        let position = cells.at(sampling.share(count, plan.particles.count, &uniforms), &uniforms);
+        let (share, uniforms) = sampling.draw(count, plan.particles.count, uniforms);
+        let position = cells.at(share, &uniforms);
         block.positions.iter_mut().zip(position).for_each(|(axis, x)| axis[idx] = x);
     }
 }

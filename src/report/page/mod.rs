@@ -7,6 +7,7 @@ mod balance;
 mod bands;
 mod budget;
 mod convergence;
+mod minimum;
 mod courses;
 mod csv;
 mod html;
@@ -39,8 +40,10 @@ pub struct Page {
 }
 
 /// What the names of the CSV files begin with.
-pub const FILE_STEMS: [&str; 8] = [
+pub const FILE_STEMS: [&str; 10] = [
     "convergence-",
+    "minimum-",
+    "minima-",
     "orders-",
     "work_precision-",
     "mass_budget.",
@@ -216,6 +219,7 @@ impl Book {
                 SweepReportKind::Convergence => {
                     ("convergence", "Convergence", convergence::convergence(study, sweep, report))
                 }
+                SweepReportKind::Minimum => ("minimum", "Where it is least", minimum::minimum(study, report)),
             };
             self.add(id, heading, html);
             self.files(files);

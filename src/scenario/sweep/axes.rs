@@ -22,10 +22,16 @@ pub(super) fn zip<'a>(
     parameters: &[Parameter],
 ) -> Option<Vec<SweepAxis>> {
     let group: Vec<Option<SweepAxis>> =
-        axes.iter().map(|written| axis(checker, written, parameters)).collect();
+        axes.iter().map(|written| one_axis(checker, written, parameters)).collect();
     let group: Vec<SweepAxis> = group.into_iter().collect::<Option<_>>()?;
     let first = group.first()?;
     let Some(at) = group.iter().position(|axis| axis.values.len() != first.values.len()) else {
+        let names: Vec<&str> = group.iter().map(|axis| axis.target.name()).collect();
+        let rows = (0..first.values.len()).map(|row| {
+            let parts = group.iter().flat_map(|axis| &axis.values[row].si);
+            (parts.copied().collect(), first.values[row].expr.span)
+        });
+        report_twice(checker, &format!("a row of `{}`", names.join("`, `")), rows);
         return Some(group);
     };
     let other = &group[at];
@@ -48,7 +54,20 @@ fn whole_span(axis: &tree::SweepAxis) -> Span {
     axis.target.span.to(last)
 }
 
+/// An axis by itself.
 pub(super) fn axis<'a>(
+    checker: &mut Checker<'a>,
+    written: &'a tree::SweepAxis,
+    parameters: &[Parameter],
+) -> Option<SweepAxis> {
+    let axis = one_axis(checker, written, parameters)?;
+    let values = axis.values.iter().map(|value| (value.si.clone(), value.expr.span));
+    report_twice(checker, &format!("a value of `{}`", axis.target.name()), values);
+    Some(axis)
+}
+
+/// An axis, in which values may stand again: beside others a row is another one.
+fn one_axis<'a>(
     checker: &mut Checker<'a>,
     written: &'a tree::SweepAxis,
     parameters: &[Parameter],
@@ -64,20 +83,19 @@ pub(super) fn axis<'a>(
         }
     }
     let span = written.target.span;
-    report_twice(checker, &target, &values);
     is_right.then_some(SweepAxis { target, span, dimension, values })
 }
 
 /// A value that stands twice would run twice with the same seeds.
-fn report_twice(checker: &mut Checker<'_>, target: &Target, values: &[AxisValue]) {
+fn report_twice(checker: &mut Checker<'_>, what: &str, values: impl Iterator<Item = (Vec<f64>, Span)>) {
     let mut seen = std::collections::BTreeMap::new();
-    for value in values {
-        let bits: Vec<u64> = value.si.iter().map(|value| value.to_bits()).collect();
-        if let Some(first) = seen.insert(bits, value.expr.span) {
-            let message = Diagnostic::error(W002, format!("a value of `{}` stands twice", target.name()));
-            let message = match first == value.expr.span {
+    for (parts, span) in values {
+        let bits: Vec<u64> = parts.iter().map(|part| part.to_bits()).collect();
+        if let Some(first) = seen.insert(bits, span) {
+            let message = Diagnostic::error(W002, format!("{what} stands twice"));
+            let message = match first == span {
                 true => message.at(first, "gives the same value twice"),
-                false => message.at(value.expr.span, "here again").also(first, "first here"),
+                false => message.at(span, "here again").also(first, "first here"),
             };
             checker.report(message.found("the same value twice").expected("each value once"));
             return;

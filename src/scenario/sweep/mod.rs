@@ -138,6 +138,7 @@ pub struct Report {
 pub enum ReportKind {
     WorkPrecision,
     Convergence,
+    Minimum,
 }
 
 /// All sweeps of a scene, and whether all of them are right.

@@ -30,7 +30,11 @@ fn report(
     measures: &[Measure],
     sweeps: &[Sweep],
 ) -> Option<Report> {
-    let kinds = [("work_precision", ReportKind::WorkPrecision), ("convergence", ReportKind::Convergence)];
+    let kinds = [
+        ("work_precision", ReportKind::WorkPrecision),
+        ("convergence", ReportKind::Convergence),
+        ("minimum", ReportKind::Minimum),
+    ];
     let kind = checker.word(&written.kind, "a report", &kinds);
     let measure = measure_name(checker, &written.measure, measures);
     let axes: Vec<&str> =

@@ -16,6 +16,9 @@ use crate::source::Span;
 use crate::syntax::tree::{self, BinaryOperator, Count, ExprKind};
 use crate::units::Dimension;
 
+/// Distances of parcels that one may lie from its place; far below, there is nothing left of an order.
+const MOST_DISORDER: f64 = 1000.0;
+
 pub fn particles<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> Option<Particles> {
     let (span, written) = statements.particles?;
     let is_mass = checker.word(&written.kind, "a kind of particle", &[("fluid", false), ("mass", true)]);
@@ -36,8 +39,38 @@ pub fn particles<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> 
         Count::Shares(list) => shares(checker, statements, list, is_mass?)?,
     };
     is_mass?;
-    let kind_span = written.kind.span;
-    Some(Particles { span, kind_span, count, count_span, placement: placement?, shares })
+    let (kind_span, placement) = (written.kind.span, placement?);
+    let disorder = match &written.disorder {
+        Some(value) => disorder(checker, value, placement, written.placement.as_ref()?.span)?,
+        None => 0.0,
+    };
+    Some(Particles { span, kind_span, count, count_span, placement, disorder, shares })
+}
+
+/// `disorder Q` after `ordered`.
+fn disorder<'a>(
+    checker: &mut Checker<'a>,
+    written: &'a tree::Expr,
+    placement: Placement,
+    placement_span: Span,
+) -> Option<f64> {
+    let what = "the disorder of parcels";
+    let value = checker.slot(written, what, Dimension::NONE)?;
+    if placement != Placement::Ordered {
+        checker.report(
+            Diagnostic::error(M004, "`disorder` says how far parcels lie from the places of an order")
+                .at(value.span, "there is no order here")
+                .also(placement_span, "this placement has no places to lie beside")
+                .found("`disorder` of particles that are not ordered")
+                .expected("`ordered disorder Q`, or no `disorder`")
+                .help("with `ordered disorder 1` each is anywhere in its share of the domain"),
+        );
+        return None;
+    }
+    let is_fine = (0.0..=MOST_DISORDER).contains(&value.value);
+    let rule = format!("from 0 to {MOST_DISORDER}");
+    checker.require(is_fine, what, precise(value.value), &rule, value.span)?;
+    Some(value.value)
 }
 
 fn number<'a>(checker: &mut Checker<'a>, written: &'a tree::Expr, what: &str) -> Option<(u64, Span)> {
@@ -75,7 +108,8 @@ fn one_share(
     let counts = all_counts(checker, statements, &counts, number.span)?;
     let kind_span = statements.particles?.1.kind.span;
     let shares = Some(Shares::Given(counts));
-    Some(Particles { span, kind_span, count, count_span: number.span, placement: Placement::Random, shares })
+    let (count_span, placement) = (number.span, Placement::Random);
+    Some(Particles { span, kind_span, count, count_span, placement, disorder: 0.0, shares })
 }
 
 fn shares<'a>(

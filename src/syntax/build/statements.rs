@@ -258,8 +258,13 @@ fn particles(parts: &mut Parts) -> Built<Particles> {
         true => Count::All(count(place, parts.need(Rule::count)?)?),
         false => Count::Shares(shares),
     };
-    let placement = parts.take(Rule::placement).map(|pair| Parts::of(place, pair).name()).transpose()?;
-    Ok(Particles { kind, count, placement })
+    let Some(pair) = parts.take(Rule::placement) else {
+        return Ok(Particles { kind, count, placement: None, disorder: None });
+    };
+    let mut parts = Parts::of(place, pair);
+    let placement = Some(parts.name()?);
+    let disorder = parts.take(Rule::kw_disorder).map(|_| parts.expression()).transpose()?;
+    Ok(Particles { kind, count, placement, disorder })
 }
 
 fn run(parts: &mut Parts) -> Built<Run> {

@@ -40,6 +40,7 @@ pub fn literal(rule: Rule) -> Option<&'static str> {
         R::kw_frame | R::frame => "frame",
         R::kw_moving => "moving",
         R::kw_support | R::support => "support",
+        R::kw_disorder => "disorder",
         R::kw_to => "to",
         R::kw_step | R::run_step => "step",
         R::kw_in | R::in_unit | R::in_box => "in",

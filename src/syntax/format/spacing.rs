@@ -19,6 +19,7 @@ const BEFORE_VALUE_IN: &[(&str, &[&str])] = &[
     ("medium", &["porosity"]),
     ("exchange", &["bandwidth", "mixing_fraction", "cutoff", "diffusion_error"]),
     ("kernel", &["support"]),
+    ("particles", &["disorder"]),
     ("dispersion", &["longitudinal", "transverse", "transverse_vertical", "molecular"]),
     ("flow", &["left", "right", "bottom", "top", "front", "back", "conductivity", "anisotropy"]),
 ];
