@@ -48,9 +48,8 @@ fn too_fine(darcy: &Darcy, plan: &Plan) -> Option<Diagnostic> {
     let Conductivity::Lognormal { lengths, variance, .. } = &darcy.conductivity else { return None };
     let widths =
         plan.axes.iter().zip(&darcy.cells).map(|(axis, &n)| (axis.high - axis.low) / n.max(1) as f64);
-    let all = widths.zip(lengths).enumerate();
-    let (axis, (width, length)) =
-        all.filter(|(_, (width, length))| *length < width && *variance > 0.0).next()?;
+    let mut all = widths.zip(lengths).enumerate();
+    let (axis, (width, length)) = all.find(|(_, (width, length))| *length < width && *variance > 0.0)?;
     let name = axis_name(plan.axes[axis].index);
     let n = ((plan.axes[axis].high - plan.axes[axis].low) / length).ceil();
     let message =

@@ -135,7 +135,7 @@ fn is_left(
         return Some(());
     }
     let inset = 1e-3 * (axis.high - axis.low);
-    let at = if side % 2 == 0 { axis.low + inset } else { axis.high - inset };
+    let at = if side.is_multiple_of(2) { axis.low + inset } else { axis.high - inset };
     let name = ["x", "y", "z"][axis.index];
     checker.report(
         Diagnostic::error(M005, "nothing leaves through a `reflect` side")
