@@ -118,6 +118,26 @@ output budget S at t = 5 d
     )
 }
 
+/// A plan counts the steps that changes of the flow cut, as the run does, and shows long rows of flows by their ends.
+#[test]
+fn a_plan_tells_of_cut_steps_and_of_long_rows_of_flows() {
+    let shown = |text: &str| {
+        let sources = Sources::single("scene.lam", text);
+        let checked = lamella::check(sources, &Settings::default(), &Options::default());
+        lamella::plan::explain::explain(&checked.compiled.expect("a plan"), "scene.lam", None)
+    };
+    let once = pulse("uniform (if t < 2.2 d then 1 m/d else 2 m/d)", "0.02 m^2/d");
+    let plan = shown(&once);
+    assert!(plan.contains("10 steps of 43200 s to 432000 s, and 1 more: steps are cut"), "{plan}");
+    assert_eq!(run(&once).outcome.n_steps, 11);
+    let on_steps = shown(&pulse("uniform (if t < 2 d then 1 m/d else 2 m/d)", "0.02 m^2/d"));
+    assert!(!on_steps.contains("are cut"), "{on_steps}");
+    let often = shown(&pulse("uniform 1 m/d * (1 + t / 10 d) change every 1 h", "0.02 m^2/d"));
+    // 119 changes, of which 11 and the last are shown.
+    assert!(often.contains("… and 107 flows between"), "{often}");
+    assert_eq!(often.lines().filter(|line| line.trim_start().starts_with("from ")).count(), 12);
+}
+
 /// `v` for 2.2 days, then `w`; the change lies within a step. Mean and variance are those of the equation, and the
 /// same of a flow by heads: the porosity is a quarter, the column 60 m long.
 #[test]

@@ -8,6 +8,7 @@ use super::error::{Kind, ReadError, RowPlaces, no_column};
 use super::parquet;
 use crate::units::Unit;
 use bytes::Bytes;
+use std::collections::BTreeMap;
 
 /// Numbers that a table may have, over all its columns.
 pub const MAX_NUMBERS: usize = 10_000_000;
@@ -46,14 +47,60 @@ fn of_parquet(bytes: &Bytes, wanted: &[Column]) -> Result<Columns, ReadError> {
     let names: Vec<&str> = wanted.iter().map(|column| column.name.as_str()).collect();
     let mut numbers = parquet::columns(bytes.clone(), &names, None, MAX_NUMBERS)?;
     let places = RowPlaces::Counted;
+    let noted = parquet::units(bytes);
     for (column, values) in wanted.iter().zip(&mut numbers) {
-        let factor = column.unit.factor();
+        let factor = unit_of(bytes, &noted, column)?.unwrap_or(column.unit).factor();
         values.iter_mut().for_each(|value| *value *= factor);
         if let Some(row) = values.iter().position(|value| !value.is_finite()) {
             return Err(too_large(&column.name).at(places.of(row)));
         }
     }
     Ok(Columns { numbers, places })
+}
+
+/// The unit that a table of ours gives a column, which must measure what the scene says; nothing where the table says
+/// nothing.
+fn unit_of(
+    bytes: &Bytes,
+    noted: &BTreeMap<String, String>,
+    column: &Column,
+) -> Result<Option<Unit>, ReadError> {
+    let Some(text) = noted.get(&column.name) else { return Ok(None) };
+    // Units may differ from row to row.
+    let text = match text.strip_prefix("see column ") {
+        Some(other) => match one_word(bytes, other, &column.name)? {
+            Some(word) => word,
+            None => return Ok(None),
+        },
+        None => text.clone(),
+    };
+    let Ok(unit) = Unit::parse(&text) else { return Ok(None) };
+    if unit.dimension == column.unit.dimension {
+        return Ok(Some(unit));
+    }
+    let name = &column.name;
+    let message = format!("the file says that column `{name}` is in {text}, and the scene says otherwise");
+    Err(ReadError::new(Kind::Mismatch, message).help(format!("declare it as `{name} [{text}]`")))
+}
+
+/// What all rows of a column of words say.
+fn one_word(bytes: &Bytes, name: &str, of: &str) -> Result<Option<String>, ReadError> {
+    let mut first: Option<String> = None;
+    let mut take = |row: usize, word: Option<&str>| match (&first, word) {
+        (None, Some(word)) => {
+            first = Some(word.to_owned());
+            Ok(())
+        }
+        (Some(first), Some(word)) if first != word => {
+            let message = format!("column `{of}` is in {first} above, and in {word} here");
+            Err(ReadError::new(Kind::Mismatch, message)
+                .at(RowPlaces::Counted.of(row))
+                .help("keep only rows of one unit"))
+        }
+        _ => Ok(()),
+    };
+    parquet::columns(bytes.clone(), &[], Some((name, &mut take)), MAX_NUMBERS)?;
+    Ok(first)
 }
 
 fn too_large(column: &str) -> ReadError {

@@ -106,7 +106,7 @@ pub fn no_column<'a>(name: &str, known: impl Iterator<Item = &'a str> + Clone) -
     let has: Vec<_> = known.clone().map(|name| format!("`{name}`")).collect();
     let error = ReadError::new(Kind::Missing, format!("there is no column `{name}`"));
     match did_you_mean(name, known) {
-        Some(near) => error.help(format!("did you mean `{near}`?")),
+        Some(near) => error.help(format!("did you mean `{near}`? The table has {}", has.join(", "))),
         None => error.help(format!("the table has {}", has.join(", "))),
     }
 }

@@ -60,10 +60,9 @@ impl DataFile {
         if let Some(table) = known.tables.get(&key) {
             return table.clone();
         }
-        let names: Vec<&str> = wanted.iter().map(|column| column.name.as_str()).collect();
         let table = self
             .columns_in(&mut known, wanted)
-            .and_then(|columns| grid::table(&columns, &names, n_axes, value, rule).map(Arc::new));
+            .and_then(|columns| grid::table(&columns, wanted, n_axes, value, rule).map(Arc::new));
         known.tables.insert(key, table.clone());
         table
     }

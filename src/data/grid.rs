@@ -2,14 +2,14 @@
 //!
 //! Owns what rows can be. May use columns and the function. It deliberately fills no gap: a grid with a hole is refused.
 
-use super::columns::Columns;
+use super::columns::{Column, Columns};
 use super::error::{Kind, ReadError};
 use super::table::{Rule, Table};
 
 /// The function of the first `n_axes` columns that another one gives.
 pub(super) fn table(
     columns: &Columns,
-    names: &[&str],
+    names: &[Column],
     n_axes: usize,
     value: usize,
     rule: Rule,
@@ -49,7 +49,7 @@ fn point_of(columns: &Columns, axes: &[Vec<f64>], row: usize) -> usize {
     })
 }
 
-fn twice(columns: &Columns, names: &[&str], n_axes: usize, [first, again]: [usize; 2]) -> ReadError {
+fn twice(columns: &Columns, names: &[Column], n_axes: usize, [first, again]: [usize; 2]) -> ReadError {
     let place =
         words(names, &columns.numbers[..n_axes].iter().map(|numbers| numbers[again]).collect::<Vec<_>>());
     let message = format!("the place {place} has been given at {} already", columns.places.of(first));
@@ -61,7 +61,7 @@ fn twice(columns: &Columns, names: &[&str], n_axes: usize, [first, again]: [usiz
 }
 
 /// The first point that no row gives.
-fn hole(columns: &Columns, names: &[&str], axes: &[Vec<f64>]) -> ReadError {
+fn hole(columns: &Columns, names: &[Column], axes: &[Vec<f64>]) -> ReadError {
     let mut points: Vec<usize> = (0..columns.n_rows()).map(|row| point_of(columns, axes, row)).collect();
     points.sort_unstable();
     if let Some(pair) = points.windows(2).find(|pair| pair[0] == pair[1]) {
@@ -88,7 +88,10 @@ fn hole(columns: &Columns, names: &[&str], axes: &[Vec<f64>]) -> ReadError {
     ReadError::new(Kind::Points, message).help("give a row for every combination of coordinates")
 }
 
-fn words(names: &[&str], place: &[f64]) -> String {
-    let word = |(name, at): (&&str, &f64)| format!("{name} = {} (SI)", crate::diagnostic::precise(*at));
+/// Coordinates in the units of the file.
+fn words(names: &[Column], place: &[f64]) -> String {
+    let word = |(column, at): (&Column, &f64)| {
+        format!("{} = {}", column.name, crate::diagnostic::precise(at / column.unit.factor()))
+    };
     names.iter().zip(place).map(word).collect::<Vec<_>>().join(", ")
 }

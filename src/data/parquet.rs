@@ -15,10 +15,14 @@ use bytes::Bytes;
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{ArrowReaderOptions, ParquetRecordBatchReaderBuilder};
 use parquet::file::metadata::ParquetMetaData;
+use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Every Parquet file begins with this.
 pub const MAGIC: &[u8] = b"PAR1";
+
+/// The key of what our tables say of themselves, as `table::footer` writes it.
+const NOTES: &str = "lamella";
 
 /// What takes the word of a row.
 pub type Take<'a> = dyn FnMut(usize, Option<&str>) -> Result<(), ReadError> + 'a;
@@ -39,6 +43,24 @@ pub fn columns(
     // The library stops at an index out of bounds in some damaged files.
     let read = catch_unwind(AssertUnwindSafe(|| read(bytes, names, words, most)));
     read.unwrap_or_else(|_| Err(damaged(&"a page contradicts itself")))
+}
+
+/// Units that a table of ours says its columns are in, by their names; nothing of other tables.
+pub fn units(bytes: &Bytes) -> BTreeMap<String, String> {
+    let notes = catch_unwind(AssertUnwindSafe(|| {
+        let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
+        let builder = ParquetRecordBatchReaderBuilder::try_new_with_options(bytes.clone(), options).ok()?;
+        let notes = builder.metadata().file_metadata().key_value_metadata()?;
+        notes.iter().find(|note| note.key == NOTES)?.value.clone()
+    }));
+    // What is damaged is told when its numbers are read.
+    let Some(notes) = notes.ok().flatten() else { return BTreeMap::new() };
+    let notes: serde_json::Value = serde_json::from_str(&notes).unwrap_or_default();
+    let columns = notes["columns"].as_array().map(Vec::as_slice).unwrap_or_default();
+    let of = |column: &serde_json::Value| {
+        Some((column["name"].as_str()?.to_owned(), column["unit"].as_str()?.to_owned()))
+    };
+    columns.iter().filter_map(of).collect()
 }
 
 fn read(

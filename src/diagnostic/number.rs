@@ -8,6 +8,8 @@ pub fn number(value: f64) -> String {
     if !value.is_finite() {
         return value.to_string();
     }
+    // Zero has no sign for a reader.
+    let value = if value == 0.0 { 0.0 } else { value };
     if value == 0.0 || (1e-3..1e6).contains(&magnitude) {
         let text = format!("{value:.6}");
         let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
@@ -38,6 +40,7 @@ mod tests {
 
     #[test]
     fn numbers_are_as_short_as_they_can_be_read() {
+        assert_eq!(number(-0.0), "0");
         let shown = [0.0, 1.5, 1000.0, 1.16e-5, 2e6, 1e300, -5e-324].map(number);
         assert_eq!(shown, ["0", "1.5", "1000", "1.16e-5", "2e6", "1e300", "-4.9407e-324"]);
         let shown = [0.0, -0.0, -1.0, 1.0 - 1.2, 1.0 + 1e-9, 7000.0, 1e8, 1e11, 1e300, -1e-30].map(precise);

@@ -21,6 +21,22 @@ use std::sync::Arc;
 pub struct Loaded {
     pub flows: FlowSeries,
     pub facts: FlowFacts,
+    /// What a budget lists besides.
+    pub packages: Vec<Listed>,
+}
+
+/// A package of a budget over all time steps.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Listed {
+    /// As `WEL`.
+    pub kind: String,
+    pub name: String,
+    /// The most cells that it lists in a time step.
+    pub n_cells: usize,
+    /// Some of its water goes through a face.
+    pub has_faces: bool,
+    /// Sides of the domain, two per axis x, y, z, that all of its cells touch.
+    pub touches: [bool; 6],
 }
 
 /// What is wrong, and with which file.
@@ -67,9 +83,11 @@ pub fn read(file: &FlowFile, bytes: &[&[u8]], setting: &Setting) -> Result<Loade
         });
     }
     let of_first = |error| Trouble { file: 0, error };
-    let (flows, outlets) = match &file.form {
-        FileForm::Table(form) => (vec![(0.0, table(form, bytes[0], setting).map_err(of_first)?)], Vec::new()),
-        FileForm::Arrays(form) => (vec![(0.0, arrays(form, bytes, setting)?)], Vec::new()),
+    let (flows, names) = match &file.form {
+        FileForm::Table(form) => {
+            (vec![(0.0, table(form, bytes[0], setting).map_err(of_first)?)], Names::default())
+        }
+        FileForm::Arrays(form) => (vec![(0.0, arrays(form, bytes, setting)?)], Names::default()),
         FileForm::Modflow(form) => modflow(form, bytes, setting).map_err(of_first)?,
     };
     let mut periods = Vec::new();
@@ -82,8 +100,10 @@ pub fn read(file: &FlowFile, bytes: &[&[u8]], setting: &Setting) -> Result<Loade
             ReadError::new(Kind::Unsupported, format!("the time steps do not follow one another: {error}"));
         of_first(error.help("layers whose water table moves hold another amount of water in each step"))
     })?;
+    let packages = names.0.clone();
+    let outlets = if matches!(file.form, FileForm::Modflow(_)) { names.outlets() } else { Vec::new() };
     let facts = facts(&flows, setting.axes, outlets);
-    Ok(Loaded { flows, facts })
+    Ok(Loaded { flows, facts, packages })
 }
 
 fn table(form: &TableForm, bytes: &[u8], setting: &Setting) -> Result<FaceFlow, ReadError> {
@@ -139,12 +159,8 @@ fn arrays(form: &Velocity, bytes: &[&[u8]], setting: &Setting) -> Result<FaceFlo
 /// Flows and when they begin, s.
 type Timed = Vec<(f64, FaceFlow)>;
 
-/// The flows of a budget, and names of what takes water out by owner.
-fn modflow(
-    form: &ModflowForm,
-    bytes: &[&[u8]],
-    setting: &Setting,
-) -> Result<(Timed, Vec<Outlet>), ReadError> {
+/// The flows of a budget, and its packages by owner.
+fn modflow(form: &ModflowForm, bytes: &[&[u8]], setting: &Setting) -> Result<(Timed, Names), ReadError> {
     let sides: Vec<(String, Side)> = form
         .sides
         .iter()
@@ -157,31 +173,54 @@ fn modflow(
     let keep: Vec<usize> = setting.axes.iter().map(|&(index, ..)| index).collect();
     let mut names = Names::default();
     let mut flows = Vec::new();
+    // A side of the grid is one of the domain only where both lie at one place.
+    let mut sides_in_common = [false; 6];
     for mut period in modflow6::read(files, &settings)?.periods {
         names.enter(&mut period);
         let mut flow = period.flow;
         flow.cells = flow.cells.moved(form.origin).ok_or_else(|| {
             ReadError::new(Kind::Mismatch, "the corner of the grid lies too far away for its cells")
         })?;
+        for &(axis, low, high) in setting.axes {
+            let edges = &flow.cells.edges()[axis];
+            let is_one = |edge: f64, end: f64| (edge - end).abs() <= 1e-6 * (high - low);
+            sides_in_common[2 * axis] = is_one(edges[0], low);
+            sides_in_common[2 * axis + 1] = is_one(edges[edges.len() - 1], high);
+        }
         flows.push((period.start, placed(on_axes(flow, &keep)?, setting.axes)?));
     }
-    Ok((flows, names.outlets()))
+    for package in &mut names.0 {
+        package.touches.iter_mut().zip(sides_in_common).for_each(|(own, is_one)| *own &= is_one);
+    }
+    Ok((flows, names))
 }
 
-/// Packages of all time steps: kind and name, in the order in which they come up.
+/// Packages of all time steps, in the order in which they come up.
 #[derive(Default)]
-struct Names(Vec<(String, String)>);
+struct Names(Vec<Listed>);
 
 impl Names {
     /// Gives the sinks of a time step owners that are the same in all of them.
     fn enter(&mut self, period: &mut modflow6::Period) {
         let mut owner_of = Vec::new();
         for package in &period.packages {
-            let own = (package.kind.clone(), package.name.clone());
-            let known = self.0.iter().position(|other| *other == own);
-            owner_of.push(known.unwrap_or(self.0.len()));
-            if known.is_none() {
-                self.0.push(own);
+            let is_it = |own: &Listed| own.kind == package.kind && own.name == package.name;
+            let known = self.0.iter().position(is_it).unwrap_or(self.0.len());
+            owner_of.push(known);
+            let has_faces = package.through_faces != 0.0;
+            match self.0.get_mut(known) {
+                Some(own) => {
+                    own.n_cells = own.n_cells.max(package.n_cells);
+                    own.has_faces |= has_faces;
+                    own.touches.iter_mut().zip(package.touches).for_each(|(own, other)| *own &= other);
+                }
+                None => self.0.push(Listed {
+                    kind: package.kind.clone(),
+                    name: package.name.clone(),
+                    n_cells: package.n_cells,
+                    has_faces,
+                    touches: package.touches,
+                }),
             }
         }
         for sink in &mut period.flow.sinks {
@@ -195,8 +234,8 @@ impl Names {
         let packages = self.0.into_iter().enumerate();
         packages
             // Water that is stored stays where it is, with all that it carries.
-            .filter(|(_, (kind, _))| !kind.starts_with("STO"))
-            .map(|(owner, (kind, name))| Outlet { name: if name.is_empty() { kind } else { name }, owner })
+            .filter(|(_, own)| !own.kind.starts_with("STO"))
+            .map(|(owner, own)| Outlet { name: if own.name.is_empty() { own.kind } else { own.name }, owner })
             .chain(across)
             .collect()
     }

@@ -10,6 +10,7 @@ pub mod cells;
 pub mod darcy;
 pub mod files;
 mod memo;
+mod packages;
 pub mod random_field;
 pub mod read;
 pub mod scene;

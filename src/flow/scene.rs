@@ -6,13 +6,15 @@
 use super::files::Trouble;
 use super::read::window::Extent;
 use super::store::Flows;
+use super::{FaceFlow, FlowSeries};
 use crate::diagnostic::codes::{M005, M026, M033, N205};
 use crate::diagnostic::{Diagnostic, number};
 use crate::plan::build_tape::build_tape;
+use crate::plan::side_water::{self, Through};
 use crate::plan::tape::{Operation, Tape};
 use crate::plan::transport::FlowFacts;
-use crate::scenario::transport::{FileFlow, Flow};
-use crate::scenario::{Output, Particles, Scenario, Station};
+use crate::scenario::transport::{FileFlow, Flow, Patch, side_names};
+use crate::scenario::{Domain, Output, Particles, Scenario, Station};
 use crate::source::{Sources, Span};
 
 /// Divergence in a cell, relative to mean discharge over cell size, above which concentrations show it.
@@ -22,6 +24,7 @@ const LARGEST_DIVERGENCE: f64 = 1e-2;
 pub fn attach(scenario: &mut Scenario, sources: &Sources, flows: &Flows) -> Vec<Diagnostic> {
     let axes: Vec<Extent> =
         scenario.domain.axes.iter().map(|axis| (axis.index, axis.low, axis.high)).collect();
+    let has_z = axes.iter().any(|(index, ..)| *index == 2);
     let porosity = match &scenario.medium {
         None => Some(Tape { operations: vec![Operation::Constant(1.0)] }),
         Some(porosity) => build_tape(&porosity.value, &scenario.species),
@@ -36,7 +39,14 @@ pub fn attach(scenario: &mut Scenario, sources: &Sources, flows: &Flows) -> Vec<
             own.facts = Some(loaded.facts.clone());
             let changes = changing(&scenario.particles, &loaded.facts, span);
             let outputs = scenario.outputs.iter().filter_map(|output| unknown_outlet(output, &loaded.facts));
-            warning(&loaded.facts, span).into_iter().chain(changes).chain(outputs).collect()
+            let packages = super::packages::check(own, &loaded.packages, has_z);
+            // A name that is wrong tells why a side has no water.
+            let sides = match packages.iter().any(Diagnostic::is_fatal) {
+                true => Vec::new(),
+                false => sides(&scenario.domain, &loaded.flows, scenario.particles.shares.is_some()),
+            };
+            let all = warning(&loaded.facts, span).into_iter().chain(changes).chain(outputs);
+            all.chain(packages).chain(sides).collect()
         }
     }
 }
@@ -69,6 +79,56 @@ fn unknown_outlet(output: &Output, facts: &FlowFacts) -> Option<Diagnostic> {
         .found(format!("`{name}`"))
         .expected(expected);
     Some(message)
+}
+
+/// Sides whose rule and water do not agree.
+fn sides(domain: &Domain, flows: &FlowSeries, is_of_mass: bool) -> Vec<Diagnostic> {
+    let all: Vec<&FaceFlow> = flows.periods().iter().map(|period| &*period.flow).collect();
+    let largest = |flow: &&FaceFlow| flow.flux.iter().flatten().fold(0.0, |max: f64, q| max.max(q.abs()));
+    let largest = all.iter().map(largest).fold(0.0, f64::max);
+    let indices: Vec<usize> = domain.axes.iter().map(|axis| axis.index).collect();
+    let mut found = Vec::new();
+    for axis in &domain.axes {
+        let names = side_names(axis.index, &indices)[0];
+        for (end, patches) in axis.patches.iter().enumerate() {
+            for (idx, patch) in patches.iter().enumerate() {
+                let water = all.iter().map(|flow| through(flow, [axis.index, end], patches, idx));
+                let most = |a: [f64; 3], b: [f64; 3]| [a[0].max(b[0]), a[1].max(b[1]), b[2]];
+                let [inwards, outwards, area] = water.fold([0.0; 3], most);
+                let share = |water: f64| if largest > 0.0 { water / (largest * area) } else { 0.0 };
+                let through = Through { inwards: Some(share(inwards)), outwards: Some(share(outwards)) };
+                if area > 0.0 {
+                    found.extend(side_water::message(patch, names[end], through, is_of_mass));
+                }
+            }
+        }
+    }
+    found
+}
+
+/// Water in and out through the faces whose middles lie in a patch, m³/s, and their area, m².
+fn through(flow: &FaceFlow, [axis, end]: [usize; 2], patches: &[Patch], idx: usize) -> [f64; 3] {
+    let (edges, n) = (flow.cells.edges(), flow.cells.n());
+    let middle =
+        |axis: usize, place: [usize; 3]| 0.5 * (edges[axis][place[axis]] + edges[axis][place[axis] + 1]);
+    let holds = |patch: &Patch, place: [usize; 3]| {
+        patch.limits.iter().all(|&(other, low, high)| (low..=high).contains(&middle(other, place)))
+    };
+    let layer = if end == 0 { 0 } else { n[axis] - 1 };
+    let mut sums = [0.0; 3];
+    for cell in 0..flow.cells.n_cells() {
+        let place = flow.cells.place(cell);
+        if place[axis] != layer || patches.iter().position(|patch| holds(patch, place)) != Some(idx) {
+            continue;
+        }
+        let (low, high) = flow.cells.faces(axis, place);
+        let area = flow.cells.face_area(axis, place);
+        let inwards = if end == 0 { flow.flux[axis][low] } else { -flow.flux[axis][high] };
+        sums[0] += area * inwards.max(0.0);
+        sums[1] += area * (-inwards).max(0.0);
+        sums[2] += area;
+    }
+    sums
 }
 
 fn refusal(flow: &FileFlow, trouble: &Trouble) -> Diagnostic {

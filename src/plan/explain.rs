@@ -95,10 +95,14 @@ fn scene_lines(plan: &Plan) -> Vec<String> {
     }
     let time = &plan.time;
     lines.push(format!(
-        "{} steps of {} s to {} s",
+        "{} steps of {} s to {} s{}",
         grouped(time.n_steps),
         number(time.step),
-        number(time.duration)
+        number(time.duration),
+        match plan.transport.as_ref().map_or(0, |transport| transport.n_cuts(time)) {
+            0 => String::new(),
+            n => format!(", and {} more: steps are cut where a flow begins within them", grouped(n)),
+        }
     ));
     let normals = match plan.walk.normals {
         Normals::Single => "normal numbers in 32-bit lanes (largest about 6.6 standard deviations)",

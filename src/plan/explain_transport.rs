@@ -12,11 +12,22 @@ use super::transport::{
 };
 use crate::diagnostic::number;
 
+/// Flows one after another that are shown.
+const SHOWN: usize = 12;
+
 /// Flow, dispersion, sides, sources, populations and sub-steps; nothing for a walk of fluid.
 pub(super) fn lines(plan: &Plan) -> Vec<String> {
     let Some(transport) = &plan.transport else { return Vec::new() };
     let mut lines = flow_lines(plan, &transport.flow);
-    lines.extend(transport.changes.iter().flat_map(|change| change_lines(plan, transport, change)));
+    let changes = &transport.changes;
+    // The first and the last ones show a rule; ten thousand lines show nothing.
+    let is_shown = |idx: usize| changes.len() <= SHOWN || idx < SHOWN - 1 || idx + 1 == changes.len();
+    for (idx, change) in changes.iter().enumerate().filter(|(idx, _)| is_shown(*idx)) {
+        if idx >= SHOWN && idx + 1 == changes.len() {
+            lines.push(format!("  … and {} flows between", idx + 1 - SHOWN));
+        }
+        lines.extend(change_lines(plan, transport, change));
+    }
     lines.push(dispersion_line(&transport.dispersion));
     lines.extend(path_line(plan, transport));
     lines.push(format!("porosity: {}", tape(&transport.porosity, "")));
@@ -93,6 +104,16 @@ fn list(values: &[f64]) -> String {
     values.iter().map(|value| number(*value)).collect::<Vec<_>>().join(", ")
 }
 
+/// The first numbers of a long list, and the last.
+fn shortened(values: &[f64]) -> String {
+    match values {
+        [first @ .., last] if values.len() > SHOWN => {
+            format!("{}, …, {}", list(&first[..SHOWN - 1]), number(*last))
+        }
+        all => list(all),
+    }
+}
+
 fn flow_lines(plan: &Plan, flow: &Flow) -> Vec<String> {
     match flow {
         Flow::Uniform(velocity) => vec![format!("flow: uniform, ({}) m/s in the frame", list(velocity))],
@@ -114,7 +135,7 @@ fn file_lines(flow: &FileFlow) -> Vec<String> {
         let n = flow.facts.changes.len() + 1;
         lines.push(format!(
             "  {n} steady flows one after another, the later ones from {} s",
-            list(&flow.facts.changes)
+            shortened(&flow.facts.changes)
         ));
     }
     lines.push(format!("  pore velocity: root mean square {} m/s", number(flow.facts.speed)));
@@ -146,12 +167,19 @@ fn change_lines(plan: &Plan, transport: &Transport, change: &Change) -> Vec<Stri
             let mut parts: Vec<String> =
                 plan.axes.iter().zip(sides).map(|(axis, ends)| ends_text(axis.index, ends)).collect();
             let wells = first.wells.iter().zip(rates);
-            parts
-                .extend(wells.map(|(well, rate)| format!("well {}, rate {} (SI)", well.name, number(*rate))));
+            let unit = rate_unit(plan);
+            parts.extend(
+                wells.map(|(well, rate)| format!("well {}, rate {} {unit}", well.name, number(*rate))),
+            );
             vec![format!("{from}: {}", parts.join("; "))]
         }
         _ => Vec::new(),
     }
+}
+
+/// The unit of a well's rate.
+fn rate_unit(plan: &Plan) -> &'static str {
+    ["m/s", "m^2/s", "m^3/s"][plan.axes.len().clamp(1, 3) - 1]
 }
 
 fn ends_text(axis: usize, ends: &[DarcySide; 2]) -> String {
@@ -195,9 +223,10 @@ fn darcy_lines(plan: &Plan, darcy: &Darcy) -> Vec<String> {
         let carrying = if well.carrying.is_empty() {
             String::new()
         } else {
-            format!(", carrying {} (SI)", carried(plan, &well.carrying))
+            format!(", carrying {}", carried(plan, &well.carrying))
         };
-        lines.push(format!("  well {} {place}, rate {} (SI){carrying}", well.name, number(well.rate)));
+        let unit = rate_unit(plan);
+        lines.push(format!("  well {} {place}, rate {} {unit}{carrying}", well.name, number(well.rate)));
     }
     lines
 }
@@ -273,7 +302,18 @@ fn part(plan: &Plan, patch: &Patch, normal: usize) -> String {
 
 /// Concentrations of all species.
 fn carried(plan: &Plan, tapes: &[Tape]) -> String {
-    let of = |(idx, of): (usize, &Tape)| format!("{} = {}", carrier(plan, idx), tape(of, ""));
+    // Concentrations of masses are those of a species; parcels carry components, amounts as all of chemistry.
+    let unit = |idx: usize| match plan.species.get(idx).filter(|_| plan.carries_mass()) {
+        Some(species) => {
+            if species.is_molar {
+                " mol/m^3"
+            } else {
+                " kg/m^3"
+            }
+        }
+        None => " (SI)",
+    };
+    let of = |(idx, of): (usize, &Tape)| format!("{} = {}", carrier(plan, idx), tape(of, unit(idx)));
     let parts: Vec<String> = tapes.iter().enumerate().map(of).collect();
     if parts.is_empty() { "nothing".to_owned() } else { parts.join(", ") }
 }
@@ -286,8 +326,8 @@ fn rule(plan: &Plan, rule: &SideRule) -> String {
         SideRule::Absorb => "absorb".to_owned(),
         SideRule::Partial(rate) => format!("absorb at {} m/s", number(*rate)),
         SideRule::Outflow => "outflow".to_owned(),
-        SideRule::Inflow(tapes) => format!("inflow with {} (SI)", carried(plan, tapes)),
-        SideRule::Held(tapes) => format!("held at {} (SI)", carried(plan, tapes)),
+        SideRule::Inflow(tapes) => format!("inflow with {}", carried(plan, tapes)),
+        SideRule::Held(tapes) => format!("held at {}", carried(plan, tapes)),
     }
 }
 

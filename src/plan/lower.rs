@@ -9,7 +9,8 @@ use super::lower_exchange;
 use super::lower_transport::{self, of_fluid};
 use super::{
     Axis, InstantReaction, Mixing, NUMERICS_VERSION, Normals, Output, OutputUnit, Particles, Plan, Quantity,
-    Stage, Time, Walk, Zone, ZoneRate, auto_step, method, shares, transport_limits,
+    Stage, Time, Walk, Zone, ZoneRate, auto_step, medium_limits, method, shares, side_water,
+    transport_limits,
 };
 use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{D008, M005};
@@ -82,6 +83,8 @@ pub fn lower(scenario: &Scenario) -> Result<Lowered, Vec<Diagnostic>> {
         if !found.is_empty() {
             return Err(found);
         }
+        warnings.extend(side_water::check(scenario, &plan));
+        warnings.extend(medium_limits::check(scenario, &plan));
     }
     method::choose(&mut plan);
     if plan.reacts_in_steps() {

@@ -3,6 +3,7 @@
 //! Owns the types. May use tapes. It deliberately solves nothing: a flow is solved or read by `flow`, and
 //! particles are moved by the engine.
 
+use super::Time;
 use super::tape::Tape;
 use crate::data::{Cloud, cloud};
 pub use crate::scenario::Covariance;
@@ -122,6 +123,19 @@ impl Transport {
             (Changed::Darcy { .. }, other) => other.clone(),
         };
         [self.flow.clone()].into_iter().chain(self.changes.iter().map(later)).collect()
+    }
+
+    /// Steps that a flow which begins within them cuts in two.
+    pub fn n_cuts(&self, time: &Time) -> u64 {
+        /// Part of a step within which a time is on it.
+        const AT_A_STEP: f64 = 1e-9;
+        let of_files: &[f64] = if let Flow::File(flow) = &self.flow { &flow.facts.changes } else { &[] };
+        let all = self.changes.iter().map(|change| change.from).chain(of_files.iter().copied());
+        let is_within = |t: &f64| {
+            let steps = t / time.step;
+            *t > 0.0 && *t < time.duration && (steps - steps.round()).abs() > AT_A_STEP
+        };
+        all.filter(is_within).count() as u64
     }
 
     /// When a new flow begins, s; the first one at 0.

@@ -12,7 +12,7 @@ use super::tape::Tape;
 use super::tape::dual::differentiate;
 use super::transport::{Conductivity, Flow, Transport};
 use crate::diagnostic::Diagnostic;
-use crate::diagnostic::codes::{M005, M029};
+use crate::diagnostic::codes::{M005, M029, M031};
 use crate::scenario::Scenario;
 use crate::scenario::expression::Expr;
 use crate::scenario::transport as written;
@@ -62,10 +62,34 @@ pub(super) fn check(scenario: &Scenario, axes: &[Axis], transport: &Transport) -
                     "above zero",
                 ));
             }
+            problems.extend(idle(own, &transport.flows()));
         }
         _ => {}
     }
     problems
+}
+
+/// Wells whose water carries something, and which never put any in.
+fn idle(written: &written::Darcy, flows: &[Flow]) -> Vec<Diagnostic> {
+    let gives = |idx: usize| {
+        let rate = |flow: &Flow| match flow {
+            Flow::Darcy(darcy) => darcy.wells.get(idx).map_or(0.0, |well| well.rate),
+            _ => 0.0,
+        };
+        flows.iter().map(rate).any(|rate| rate > 0.0)
+    };
+    let told = |(idx, well): (usize, &written::Well)| {
+        let (_, carried) = well.carrying.first().filter(|_| !gives(idx))?;
+        let message =
+            Diagnostic::error(M031, format!("well `{}` carries something and puts no water in", well.name))
+                .at(carried.span, "what its water carries")
+                .also(well.rate.span, "zero or below at all times: water is taken out, with what is in it")
+                .found("a rate that is never above zero")
+                .expected("a rate above zero at some time, or nothing carried")
+                .help("leave `carrying` out, or turn the sign of the rate round");
+        Some(message)
+    };
+    written.wells.iter().enumerate().filter_map(told).collect()
 }
 
 /// Concentrations and rates that enter and are below zero at some place or time.

@@ -5,8 +5,8 @@ use super::expression::{Expr, Type};
 use super::results::norm_of;
 use super::scope::{BUILT_IN_FUNCTIONS, Locals, Origin};
 use crate::catalog::rate;
+use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{D005, D006, D007, D009, U102, U104};
-use crate::diagnostic::{Diagnostic, precise};
 use crate::maths::operator::{Binary, Unary};
 use crate::source::Span;
 use crate::syntax::tree;
@@ -124,7 +124,8 @@ impl<'a> Checker<'a> {
         for (argument, bound) in item.bounds {
             let Some(value) = values[*argument].value() else { continue };
             let what = format!("`{}` of `{}`", item.arguments[*argument].0, item.name);
-            let found = format!("{} (SI)", precise(value));
+            let of = &values[*argument];
+            let found = self.shown(value, of.kind.dimension().unwrap_or_default(), of.span);
             self.require(bound.allows(value), &what, found, bound.words(), values[*argument].span)?;
         }
         Some(())

@@ -155,6 +155,9 @@ impl<'a> Checker<'a> {
 
     fn path(&mut self, path: &'a [tree::Name], span: Span, allow: Allow, locals: &Locals) -> Option<Expr> {
         let [name] = path else {
+            if self.is_column_alone(path, span) {
+                return None;
+            }
             if allow.results {
                 return self.result_of_output(path, span);
             }

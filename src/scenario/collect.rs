@@ -6,8 +6,8 @@ use super::scope::{Origin, Scope};
 use super::settings::{check_setting, read_settings, unit_as_written};
 use super::transport::{self, Dispersion, Flow};
 use super::{Domain, Parameter, Scenario, Settings};
+use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{D001, M001, M002, M018, P002};
-use crate::diagnostic::{Diagnostic, precise};
 use crate::source::{Sources, Span, Spanned};
 use crate::syntax::tree::{self, StatementKind};
 
@@ -364,6 +364,7 @@ fn motion<'a>(
     });
     let medium = transport::flow::porosity(checker, statements);
     let flow = transport::flow::flow(checker, statements);
+    transport::flow::one_porosity(checker, statements, flow.as_ref().and_then(Option::as_ref));
     let dispersion = transport::dispersion::dispersion(checker, statements);
     are_sides_right.then_some((medium?, flow?, dispersion?))
 }
@@ -424,12 +425,15 @@ fn parameters<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> Vec
         if let Some((low, high, _)) = range
             && !(low.value..=high.value).contains(&value)
         {
+            let dimension = dimension.unwrap_or_default();
+            let found = checker.shown(value, dimension, given.value.span);
+            let expected = checker.shown_range((low.value, high.value), dimension, given.value.span);
             checker.report(
                 Diagnostic::error(P002, format!("`{name}` lies outside of its range"))
                     .at(given.value.span, "this value")
                     .also(low.span.to(high.span), "this range")
-                    .found(format!("{} (SI)", precise(value)))
-                    .expected(format!("{} to {} (SI)", precise(low.value), precise(high.value))),
+                    .found(found)
+                    .expected(expected),
             );
         }
         list.push(Parameter {

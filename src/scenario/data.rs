@@ -156,6 +156,37 @@ impl<'a> Checker<'a> {
         Some((statement, known, idx))
     }
 
+    /// Reports a column that stands where a value is needed, without its coordinates; `false` for another path.
+    pub(super) fn is_column_alone(&mut self, path: &'a [tree::Name], span: Span) -> bool {
+        let [table, column] = path else { return false };
+        let Some(statement) = self.table_of(&table.value) else { return false };
+        let Some(idx) = statement.columns.iter().position(|own| own.name.value == column.value) else {
+            // The same message as of a call.
+            let name = tree::Name::new(format!("{}.{}", table.value, column.value), span);
+            if let Some(known) = self.tables.get(&table.value).cloned().flatten() {
+                self.value_column(statement, &known, &name, 1);
+            }
+            return true;
+        };
+        let before = &statement.columns[..idx.min(3)];
+        let list: Vec<&str> = before.iter().map(|own| own.name.value.as_str()).collect();
+        let (what, expected) = match list.is_empty() {
+            true => ("the first coordinate of the table", "a column after the coordinates".to_owned()),
+            false => ("a column of the table: a function of those before it", list.join(", ")),
+        };
+        let message = Diagnostic::error(
+            D007,
+            format!("`{}.{}` has no value without a place", table.value, column.value),
+        )
+        .at(span, what)
+        .also(statement.name.span, "declared here")
+        .found("a column without arguments")
+        .expected(if list.is_empty() { expected } else { format!("its coordinates: {expected}") });
+        let example = || format!("write for example `{}.{}({})`", table.value, column.value, list.join(", "));
+        self.report(if list.is_empty() { message } else { message.help(example()) });
+        true
+    }
+
     /// What kind of value such a column has.
     pub(super) fn kind_of_column(&mut self, expr: &'a tree::Expr) -> Option<Type> {
         let (_, known, idx) = self.column_of(expr)?;
@@ -301,11 +332,14 @@ impl<'a> Checker<'a> {
         if values.iter().any(|value| value.value().is_none()) {
             return Some(());
         }
-        for (axis, value) in values.iter().filter_map(Expr::value).enumerate() {
+        for (axis, expr) in values.iter().enumerate() {
+            let Some(value) = expr.value() else { continue };
             if !table.speaks_of(axis, value, value) {
-                let (low, high) = table.extent(axis);
+                let dimension = expr.kind.dimension().unwrap_or_default();
+                let found = self.shown(value, dimension, expr.span);
+                let rows = self.shown_range(table.extent(axis), dimension, expr.span);
                 let column = &statement.columns[axis].name.value;
-                self.report(extent::beyond(column, (value, value), (low, high), span));
+                self.report(extent::beyond(column, &found, &rows, span));
                 return None;
             }
         }

@@ -63,7 +63,8 @@ pub(super) fn equilibrium<'a>(
             return None;
         }
     }
-    let found = format!("{} (SI)", precise(value));
+    let dimension = checked.kind.dimension().unwrap_or_default();
+    let found = checker.shown(value, dimension, argument.value.span);
     checker.require(value > 0.0, "an equilibrium constant", found, "above zero", argument.value.span)?;
     Some(value)
 }

@@ -33,6 +33,7 @@ mod restriction;
 mod results;
 mod scope;
 mod settings;
+mod shown;
 mod slot;
 mod station;
 pub mod sweep;

@@ -30,7 +30,8 @@ impl SpeciesList {
     }
 }
 
-const CONCENTRATIONS: [Dimension; 2] = [Dimension::MOLAR_CONCENTRATION, Dimension::MASS_CONCENTRATION];
+pub(super) const CONCENTRATIONS: [Dimension; 2] =
+    [Dimension::MOLAR_CONCENTRATION, Dimension::MASS_CONCENTRATION];
 
 pub(super) fn species<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> SpeciesList {
     let properties: Vec<_> =
@@ -185,13 +186,8 @@ fn initial_of<'a>(
         && let Some(value) = expr.value()
         && value < 0.0
     {
-        checker.require(
-            false,
-            &what,
-            format!("{} (SI)", precise(value)),
-            "zero or more",
-            assignment.value.span,
-        );
+        let found = checker.shown(value, expr.kind.dimension().unwrap_or_default(), assignment.value.span);
+        checker.require(false, &what, found, "zero or more", assignment.value.span);
     }
     initials[idx] = match (checked, kind) {
         (Some(expr), Some(_)) => Initial::Known(expr),
@@ -209,6 +205,7 @@ fn infer_dimensions<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) 
     let of_wells = wells(statements).flat_map(|it| &it.carrying).map(|it| (it, true, Allow::TIME));
     let of_sources = statements.sources.iter().flat_map(|(_, it)| &it.carried);
     let of_sources = of_sources.map(|it| (it, false, Allow::TIME));
+    let mut wrong = Vec::new();
     for (assignment, is_concentration, allow) in at_sides.chain(of_wells).chain(of_sources) {
         let Some(Origin::Species(idx)) = checker.scope.get(&assignment.name.value).map(|it| it.origin) else {
             continue;
@@ -220,7 +217,10 @@ fn infer_dimensions<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) 
             Some(kind) => Some(kind),
             None => checker.check(&assignment.value, allow).map(|value| value.kind),
         };
-        let Some(kind) = kind else { continue };
+        let Some(kind) = kind else {
+            wrong.push(idx);
+            continue;
+        };
         checker.species_dimensions[idx] = match kind {
             Type::Number(dimension) if is_concentration => {
                 Some(dimension).filter(|dimension| dimension.is_concentration())
@@ -228,7 +228,12 @@ fn infer_dimensions<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) 
             _ if is_concentration => None,
             kind => super::transport::source::concentration_for(kind, n_axes),
         };
+        if kind != Type::Zero && checker.species_dimensions[idx].is_none() {
+            wrong.push(idx);
+        }
     }
+    // A value that says neither is told once, and not at everything that would have to agree with it.
+    checker.is_initial_wrong |= wrong.into_iter().any(|idx| checker.species_dimensions[idx].is_none());
 }
 
 /// The wells of a flow.

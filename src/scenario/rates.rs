@@ -203,7 +203,7 @@ fn rate<'a>(checker: &mut Checker<'a>, written: &'a tree::Expr, equation: Equati
     if let Some(value) = checked.value()
         && value < 0.0
     {
-        let found = format!("{} (SI)", precise(value));
+        let found = checker.shown(value, dimension, written.span);
         checker.require(false, "a rate", found, "zero or more", written.span)?;
     }
     if checked.names_species() {

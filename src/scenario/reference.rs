@@ -267,7 +267,8 @@ fn item_solution<'a>(
         let value = checker.slot(written, &what, dimension).and_then(|value| {
             let rule = format!("{} ({})", argument.doc, allowed(low, high));
             let is_fine = (low..=high).contains(&value.value);
-            checker.require(is_fine, &what, format!("{} (SI)", precise(value.value)), &rule, value.span)?;
+            let found = checker.shown(value.value, dimension, value.span);
+            checker.require(is_fine, &what, found, &rule, value.span)?;
             Some(value.value)
         });
         match value {

@@ -139,10 +139,13 @@ impl<'a> Checker<'a> {
         let span = low.span.to(high.span);
         let (low, high) = (low.value()?, high.value()?);
         if low > high || (low == high && dimension.is_some()) {
+            let shown = [(low, &range.low), (high, &range.high)]
+                .map(|(value, written)| self.shown(value, expected, written.span))
+                .join(" .. ");
             self.report(
                 Diagnostic::error(M005, format!("{what} is empty"))
                     .at(span, "the first bound must lie below the second")
-                    .found(format!("{} .. {} (SI)", precise(low), precise(high)))
+                    .found(shown)
                     .expected("a lower bound, `..`, an upper bound"),
             );
             return None;

@@ -94,6 +94,7 @@ fn at_place<'a>(
                 return no_meaning(checker, kind, name.span, "a resident mean at a side", "a plane");
             }
             let part = part(checker, limits, domain?, side / 2)?;
+            is_left(checker, kind, domain?, side, name.span)?;
             Some(limited(Station::Side(side), limits, part))
         }
         tree::Place::Plane(name, value, limits) => {
@@ -111,9 +112,40 @@ fn at_place<'a>(
             if is_resident == Some(true) {
                 return slab(checker, written, axis, part, (axis_idx, at.value));
             }
-            Some(limited(plane(axis, axis_idx, at.value), limits, part))
+            let plane = plane(axis, axis_idx, at.value);
+            if let Station::Side(side) = plane {
+                is_left(checker, kind, domain?, side, at.span)?;
+            }
+            Some(limited(plane, limits, part))
         }
     }
+}
+
+/// Reports a first passage at a side that turns all particles back: what leaves there is counted, and nothing does.
+fn is_left(
+    checker: &mut Checker<'_>,
+    kind: OutputKind,
+    domain: &Domain,
+    side: usize,
+    span: Span,
+) -> Option<()> {
+    let axis = &domain.axes[side / 2];
+    let patches = &axis.patches[side % 2];
+    if kind != OutputKind::FirstPassage || !patches.iter().all(|patch| patch.rule == SideRule::Reflect) {
+        return Some(());
+    }
+    let inset = 1e-3 * (axis.high - axis.low);
+    let at = if side.is_multiple_of(2) { axis.low + inset } else { axis.high - inset };
+    let name = ["x", "y", "z"][axis.index];
+    checker.report(
+        Diagnostic::error(M005, "nothing leaves through a `reflect` side")
+            .at(span, "particles are turned back there; a side counts what leaves through it")
+            .also(patches[0].span, "this side")
+            .found("`reflect`")
+            .expected("a plane within the domain, or a side that particles leave through")
+            .help(format!("write `at {name} = {} m` for what comes near this side", precise(at))),
+    );
+    None
 }
 
 /// Reports a place at which only masses are counted yet.
@@ -256,7 +288,7 @@ fn well(checker: &mut Checker<'_>, statements: &Statements<'_>, name: &tree::Nam
     }
     if words.is_empty() {
         checker.report(
-            Diagnostic::error(M005, "this scene has no wells")
+            Diagnostic::error(M001, "this scene has no wells")
                 .at(name.span, "a well")
                 .found(format!("`{}`", name.value))
                 .expected("a `well` in `flow darcy`, or another place")

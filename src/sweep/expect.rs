@@ -91,6 +91,15 @@ impl<'a> Judge<'a> {
     }
 }
 
+/// The first few, and how many more there are.
+fn listed(texts: &[&str]) -> String {
+    let shown = texts[..texts.len().min(MAX_NAMED)].join("; ");
+    match texts.len().saturating_sub(MAX_NAMED) {
+        0 => shown,
+        more => format!("{shown}; and {more} more"),
+    }
+}
+
 impl Verdict<'_> {
     fn check(
         &mut self,
@@ -131,8 +140,8 @@ impl Verdict<'_> {
                 let (outcome, detail) = self.condition(is_whole);
                 (outcome, detail, None)
             }
-            ExpectKind::Mean { measure, low, high } => {
-                let (outcome, detail) = self.mean(scene, measure, (*low, *high), is_whole);
+            ExpectKind::Mean { measure, low, high, unit } => {
+                let (outcome, detail) = self.mean(scene, (measure, unit), (*low, *high), is_whole);
                 (outcome, detail, None)
             }
             ExpectKind::Order { measure, axis, low, high } => {
@@ -165,7 +174,7 @@ impl Verdict<'_> {
     fn mean(
         &self,
         scene: &Scene,
-        measure: &str,
+        (measure, (factor, unit)): (&str, &(f64, String)),
         (low, high): (f64, f64),
         is_whole: bool,
     ) -> (ExpectationOutcome, String) {
@@ -180,7 +189,8 @@ impl Verdict<'_> {
             let n = values.len() as f64;
             let mean = values.iter().sum::<f64>() / n;
             let square: f64 = values.iter().map(|value| (value - mean) * (value - mean)).sum();
-            let digits = crate::diagnostic::number;
+            let digits = |value: f64| crate::diagnostic::number(value / factor);
+            let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
             let error = if n > 1.0 {
                 format!(" ± {}", digits((square / (n - 1.0) / n).sqrt()))
             } else {
@@ -188,7 +198,7 @@ impl Verdict<'_> {
             };
             let name = scene.name(*combination);
             let of = if name.is_empty() { String::new() } else { format!(" ({name})") };
-            (mean, format!("{measure} = {}{error} at point {number}{of}", digits(mean)))
+            (mean, format!("{measure} = {}{error}{unit} at point {number}{of}", digits(mean)))
         };
         let means: Vec<(f64, String)> = points.iter().map(shown).collect();
         if means.is_empty() || means.iter().any(|(mean, _)| mean.is_nan()) {
@@ -200,11 +210,11 @@ impl Verdict<'_> {
             .map(|(_, text)| &text[..])
             .collect();
         if !broken.is_empty() {
-            return (ExpectationOutcome::NotMet, broken[..broken.len().min(MAX_NAMED)].join("; "));
+            return (ExpectationOutcome::NotMet, listed(&broken));
         }
-        let texts: Vec<&str> = means.iter().take(MAX_NAMED).map(|(_, text)| &text[..]).collect();
+        let texts: Vec<&str> = means.iter().map(|(_, text)| &text[..]).collect();
         let outcome = if is_whole { ExpectationOutcome::Met } else { ExpectationOutcome::Unknown };
-        (outcome, texts.join("; "))
+        (outcome, listed(&texts))
     }
 
     /// The slope over all lines, each with an offset of its own.

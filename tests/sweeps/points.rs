@@ -105,6 +105,20 @@ fn expectations_fail_visibly() {
 }
 
 #[test]
+fn means_are_told_in_the_unit_that_they_are_expected_in() {
+    let folder = Folder::new();
+    let sweep = "  c0 1 mol/m^3, 2 mol/m^3\n  expect mean(of_the_end) in 5 mmol/L .. 6 mmol/L";
+    const MEAN: &str = "measure of_the_end = 3 mol/m^3 + 0 mol/m^3 * err\n";
+    folder.write("s.lam", scene_with(sweep) + MEAN);
+    let done = folder.lamella(&["sweep", "s.lam", "--out", "out"]).exits(1);
+    done.gives("NOT MET (of_the_end = 3 mmol/L at point 0");
+    // No more than a few are named, and the rest is counted.
+    let sweep = "  D linspace(1e-4 m^2/s, 1e-3 m^2/s, 9)\n  expect mean(of_the_end) in 5 mmol/L .. 6 mmol/L";
+    folder.write("m.lam", scene_with(sweep) + MEAN);
+    folder.lamella(&["sweep", "m.lam", "--out", "many"]).exits(1).gives(" more)");
+}
+
+#[test]
 fn axes_can_be_given_on_the_command_line() {
     let folder = Folder::new();
     folder.write("s.lam", crate::SCENE);

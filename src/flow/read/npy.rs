@@ -90,8 +90,15 @@ pub fn centred(array: &Array, frame: &Frame) -> Result<FaceFlow, ReadError> {
     if !is_plain && (array.shape.len() != axes + 1 || array.shape[axes] != axes) {
         let wanted = ["(nx) or (nx, 1)", "(nx, ny, 2)", "(nx, ny, nz, 3)"][axes - 1];
         let message = format!("the array has the shape {:?}", array.shape);
+        let help = match array.shape.len() == axes + 1 && array.shape[0] == axes {
+            true => {
+                "its components come first: `numpy.moveaxis(array, 0, -1)` puts them last, and `array.T` turns round \
+                     all axes of an array that counts z, y, x; "
+            }
+            false => "",
+        };
         return Err(ReadError::new(Kind::Mismatch, message)
-            .help(format!("discharge at the middles of cells has the shape {wanted}")));
+            .help(format!("{help}discharge at the middles of cells has the shape {wanted}")));
     }
     let cells = cells(&array.shape[..axes], frame)?;
     let component = |axis: usize| array.values.iter().skip(axis).step_by(axes).map(|q| q * frame.factor);
@@ -122,6 +129,18 @@ pub fn staggered(arrays: &[Array], frame: &Frame) -> Result<FaceFlow, ReadError>
                 });
         if !fits {
             let name = ["x", "y", "z"][axis];
+            let turned: Vec<Vec<usize>> =
+                arrays.iter().map(|array| array.shape.iter().rev().copied().collect()).collect();
+            if fit(&turned) {
+                let message = format!(
+                    "the axes of the arrays are swapped: that of {name} has the shape {:?}",
+                    array.shape
+                );
+                return Err(ReadError::new(Kind::Mismatch, message).help(format!(
+                    "axes come in the order x, y, z, as in {:?}: `numpy.save(file, array.T)`",
+                    turned[axis]
+                )));
+            }
             let message = format!("the faces normal to {name} have the shape {:?}", array.shape);
             return Err(ReadError::new(Kind::Mismatch, message).help(format!(
                 "with {n:?} cells, as the faces normal to x have it, there is one face more along {name} and as \
@@ -136,6 +155,18 @@ pub fn staggered(arrays: &[Array], frame: &Frame) -> Result<FaceFlow, ReadError>
     });
     let porosity = porosity(&cells, frame.porosity)?;
     Ok(FaceFlow { cells, flux, porosity, head: None, conductivity: None, sinks: Vec::new() })
+}
+
+/// Whether shapes are those of faces normal to x, y, z of the same cells.
+fn fit(shapes: &[Vec<usize>]) -> bool {
+    let cells = |axis: usize, shape: &Vec<usize>| {
+        let own = |(other, n): (usize, &usize)| n.checked_sub(usize::from(other == axis));
+        shape.iter().enumerate().map(own).collect::<Option<Vec<_>>>()
+    };
+    let all: Vec<_> = shapes.iter().enumerate().map(|(axis, shape)| cells(axis, shape)).collect();
+    let is_one =
+        |own: &Option<Vec<usize>>| own.as_ref().is_some_and(|n| n.len() == shapes.len()) && *own == all[0];
+    all.iter().all(is_one)
 }
 
 fn cells(n: &[usize], frame: &Frame) -> Result<Cells, ReadError> {

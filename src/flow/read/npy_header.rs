@@ -76,6 +76,16 @@ impl Header {
             Some(Entry::Text("<f4")) => (Number::Single, false),
             Some(Entry::Text(">f4")) => (Number::Single, true),
             None => return Err(damaged()),
+            Some(Entry::Text("|O" | "O")) => {
+                return Err(ReadError::new(
+                    Kind::Unsupported,
+                    "the elements are objects of Python, not numbers",
+                )
+                .help(
+                    "rows of different lengths, words or `None` make such an array: mend these, then \
+                         `numpy.save(file, numpy.array(rows, dtype=\"f8\"))`",
+                ));
+            }
             Some(other) => {
                 let kind = if let Entry::Text(kind) = other { format!("`{kind}`") } else { "records".into() };
                 return Err(ReadError::new(Kind::Unsupported, format!("the elements are {kind}"))

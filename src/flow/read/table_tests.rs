@@ -132,7 +132,10 @@ fn wrong_text_is_named_by_line_and_column() {
     assert_eq!(of("x,y,qx,qy\n1,1,,0\n").message, "column `qx` is empty here");
     assert_eq!(of("x,y,qx,qy\n1,1,0\n").message, "3 fields, the line of names has 4");
     assert_eq!(of("x;y;qx;qy\n1;1;0;0\n").kind, Kind::Unsupported);
-    assert_eq!(of("x,y,QX,qy\n1,1,0,0\n").help.as_deref(), Some("did you mean `QX`?"));
+    assert_eq!(
+        of("x,y,QX,qy\n1,1,0,0\n").help.as_deref(),
+        Some("did you mean `QX`? The table has `x`, `y`, `QX`, `qy`")
+    );
     assert_eq!(of("x,y,qx,qx,qy\n").place, line(1, 8));
     assert_eq!(of("x,y,qx,qy\n1,1,\"0,0\n").message, "this quote is never closed");
     assert_eq!(of("x,y,qx,qy\n1,1,\"0\"0,0\n").message, "text follows a closing quote");

@@ -9,8 +9,8 @@ use super::super::check::Checker;
 use super::super::expression::{Expr, Node};
 use super::super::transport::{Conductivity, Dispersion, Flow, SideRule};
 use crate::data::Table;
+use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{T103, T104};
-use crate::diagnostic::{Diagnostic, precise};
 use crate::maths::interval::Interval;
 use crate::maths::operator::Binary;
 use crate::source::Span;
@@ -34,7 +34,7 @@ pub(in crate::scenario) fn check_extents(checker: &mut Checker<'_>, scenario: &S
     let inputs = Inputs { axes, time: Interval::new(0.0, scenario.run.duration) };
     let mut told = Vec::new();
     for expr in everywhere(scenario) {
-        visit(expr, &inputs, true, &mut told);
+        visit(checker, expr, &inputs, true, &mut told);
     }
     for axis in &scenario.domain.axes {
         for patch in axis.patches.iter().flatten() {
@@ -43,7 +43,7 @@ pub(in crate::scenario) fn check_extents(checker: &mut Checker<'_>, scenario: &S
             for &(index, low, high) in &patch.limits {
                 inputs.axes[index] = Interval::new(low, high);
             }
-            list.iter().for_each(|(_, expr)| visit(expr, &inputs, true, &mut told));
+            list.iter().for_each(|(_, expr)| visit(checker, expr, &inputs, true, &mut told));
         }
     }
     let mut seen: Vec<Span> = Vec::new();
@@ -81,58 +81,64 @@ fn everywhere(scenario: &Scenario) -> Vec<&Expr> {
 }
 
 /// `is_certain`: no condition stands before this part.
-fn visit(expr: &Expr, inputs: &Inputs, is_certain: bool, told: &mut Vec<(Diagnostic, Span)>) {
+fn visit(
+    checker: &Checker<'_>,
+    expr: &Expr,
+    inputs: &Inputs,
+    is_certain: bool,
+    told: &mut Vec<(Diagnostic, Span)>,
+) {
+    let mut go = |part: &Expr, is_certain: bool| visit(checker, part, inputs, is_certain, told);
     match &expr.node {
         Node::Constant(_) | Node::Axis(_) | Node::Time | Node::Species(_) => {}
-        Node::Unary(_, a) => visit(a, inputs, is_certain, told),
-        Node::Binary(_, a, b) => [a, b].into_iter().for_each(|part| visit(part, inputs, is_certain, told)),
+        Node::Unary(_, a) => go(a, is_certain),
+        Node::Binary(_, a, b) => [a, b].into_iter().for_each(|part| go(part, is_certain)),
         Node::Select(condition, a, b) => {
-            visit(condition, inputs, is_certain, told);
-            [a, b].into_iter().for_each(|part| visit(part, inputs, false, told));
+            go(condition, is_certain);
+            [a, b].into_iter().for_each(|part| go(part, false));
         }
         Node::Table(table, at) => {
-            at.iter().for_each(|part| visit(part, inputs, is_certain, told));
-            told.extend(
-                at.iter().enumerate().filter_map(|(axis, part)| {
-                    Some((judge(table, axis, part, inputs, is_certain)?, expr.span))
-                }),
-            );
+            at.iter().for_each(|part| go(part, is_certain));
+            told.extend(at.iter().enumerate().filter_map(|(axis, part)| {
+                Some((judge(checker, table, axis, (part, is_certain), inputs)?, expr.span))
+            }));
         }
     }
 }
 
-fn judge(table: &Table, axis: usize, at: &Expr, inputs: &Inputs, is_certain: bool) -> Option<Diagnostic> {
+fn judge(
+    checker: &Checker<'_>,
+    table: &Table,
+    axis: usize,
+    (at, is_certain): (&Expr, bool),
+    inputs: &Inputs,
+) -> Option<Diagnostic> {
     let found = bounds(at, inputs);
     if table.speaks_of(axis, found.low, found.high) {
         return None;
     }
-    let (low, high) = table.extent(axis);
+    let shown =
+        |range: (f64, f64)| checker.shown_range(range, at.kind.dimension().unwrap_or_default(), at.span);
+    let (found, rows) = (shown((found.low, found.high)), shown(table.extent(axis)));
     let column = format!("coordinate {} of the table", axis + 1);
     if is_certain && is_exact(at) {
-        return Some(beyond(&column, (found.low, found.high), (low, high), at.span));
+        return Some(beyond(&column, &found, &rows, at.span));
     }
     Some(
         Diagnostic::warning(T104, "a table may be asked beyond its rows")
-            .at(
-                at.span,
-                format!("{column} may go from {} to {} here", precise(found.low), precise(found.high)),
-            )
-            .found(format!("{} to {} (SI)", precise(found.low), precise(found.high)))
-            .expected(format!("{} to {} (SI)", precise(low), precise(high)))
+            .at(at.span, format!("{column} may go from {found} here"))
+            .found(found)
+            .expected(rows)
             .note("beyond its rows a table holds the value of its edge"),
     )
 }
 
 /// The message about coordinates for which there are no rows.
-pub(super) fn beyond(column: &str, found: (f64, f64), rows: (f64, f64), span: Span) -> Diagnostic {
-    let words = |(low, high): (f64, f64)| match low == high {
-        true => format!("{} (SI)", precise(low)),
-        false => format!("{} to {} (SI)", precise(low), precise(high)),
-    };
+pub(super) fn beyond(column: &str, found: &str, rows: &str, span: Span) -> Diagnostic {
     Diagnostic::error(T103, format!("{column} is asked where there are no rows"))
-        .at(span, format!("this is {}", words(found)))
-        .found(words(found))
-        .expected(words(rows))
+        .at(span, format!("this is {found}"))
+        .found(found)
+        .expected(rows)
         .help("add rows to the table, or hold it at an edge with `min(…)` and `max(…)`")
 }
 

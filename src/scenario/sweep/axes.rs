@@ -254,8 +254,10 @@ fn space<'a>(
     if function.value == "linspace" {
         return Some(spaced(n, |part| low + (high - low) * part, low, high));
     }
-    checker.require(low > 0.0, what, format!("{low} (SI)"), "above zero for `logspace`", span)?;
-    checker.require(high > 0.0, what, format!("{high} (SI)"), "above zero for `logspace`", span)?;
+    for end in [low, high] {
+        let found = checker.shown(end, dimension, span);
+        checker.require(end > 0.0, what, found, "above zero for `logspace`", span)?;
+    }
     let ratio = high / low;
     Some(spaced(n, |part| low * crate::maths::scalar::pow(ratio, part), low, high))
 }
@@ -284,17 +286,12 @@ fn progression<'a>(
     let by = checker.slot(by, if is_factor { "the factor" } else { "the increment" }, of_by)?;
     let (low, high, _) = ends?;
     let (low, high, step) = (low.value, high.value, by.value);
-    let found = format!("{step} (SI)");
+    let found = checker.shown(step, of_by, by.span);
     // What rounding adds must not lose the last value.
     const SLACK: f64 = 1e-9;
     let n = if is_factor {
-        checker.require(
-            low > 0.0,
-            what,
-            format!("{low} (SI)"),
-            "above zero for `by factor`",
-            range.low.span,
-        )?;
+        let shown = checker.shown(low, dimension, range.low.span);
+        checker.require(low > 0.0, what, shown, "above zero for `by factor`", range.low.span)?;
         checker.require(step > 1.0, "the factor", found, "above one", by.span)?;
         crate::maths::scalar::ln(high / low) / crate::maths::scalar::ln(step) + SLACK
     } else {

@@ -150,5 +150,6 @@ fn mean<'a>(
     let measure = measure_name(checker, name, measures)?;
     let dimension = measures.iter().find(|other| other.name == measure)?.dimension;
     let (low, high, _) = checker.range(range, "the expected mean", Some(dimension))?;
-    Some(ExpectKind::Mean { measure, low: low.value, high: high.value })
+    let unit = checker.unit_for(dimension, range.high.span);
+    Some(ExpectKind::Mean { measure, low: low.value, high: high.value, unit })
 }

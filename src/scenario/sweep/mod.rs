@@ -120,8 +120,8 @@ pub enum ExpectKind {
     Holds(Condition),
     /// The slope of ln(mean of the measure) by ln(value of the axis).
     Order { measure: String, axis: Target, low: f64, high: f64 },
-    /// The mean over the replicates of each point.
-    Mean { measure: String, low: f64, high: f64 },
+    /// The mean over the replicates of each point; `unit` is that of the range, with what one of it is in SI.
+    Mean { measure: String, low: f64, high: f64, unit: (f64, String) },
 }
 
 /// What is drawn of a sweep besides what is always drawn.

@@ -4,13 +4,13 @@
 //! solves nothing.
 
 use super::super::check::{Allow, Checker};
-use super::super::expression::Expr;
+use super::super::expression::{Expr, Type};
 use super::super::geometry::grid;
 use super::change::changes;
 use super::lognormal;
 use super::sides::{concentrations, side_names, side_words};
 use super::{Conductivity, Darcy, DarcySide, Well};
-use crate::diagnostic::codes::{D002, D009, M001, M002, M028, M030};
+use crate::diagnostic::codes::{D002, D009, M001, M002, M028, M030, U104};
 use crate::diagnostic::{Diagnostic, precise};
 use crate::source::{Span, Spanned};
 use crate::syntax::tree::{self, DarcyEntry, DarcyKind};
@@ -263,7 +263,7 @@ fn read_well<'a>(checker: &mut Checker<'a>, well: &'a tree::Well) -> Option<Well
     let n_axes = checker.axes.len();
     let area = Dimension::LENGTH.power(n_axes as i32, 1)?;
     let rate = match &well.rate {
-        Some(rate) => timed(checker, rate, "the rate of a well", area.over(Dimension::TIME)),
+        Some(rate) => rate_of(checker, well, rate, area.over(Dimension::TIME)),
         None => {
             checker.report(
                 Diagnostic::error(M001, format!("well `{}` has no rate", well.name.value))
@@ -278,6 +278,35 @@ fn read_well<'a>(checker: &mut Checker<'a>, well: &'a tree::Well) -> Option<Well
     let (low, high) = well_place(checker, well)?;
     checker.is_inside(&[low, high], &format!("well `{}`", well.name.value), well.at.span, M028)?;
     Some(Well { name: well.name.value.clone(), low, high, rate: rate?, carrying: carrying? })
+}
+
+/// Water per time; with fewer than three axes per unit of what is missing.
+fn rate_of<'a>(
+    checker: &mut Checker<'a>,
+    well: &tree::Well,
+    written: &'a tree::Expr,
+    wanted: Dimension,
+) -> Option<Expr> {
+    let value = checker.check(written, Allow::TIME)?;
+    if matches!(value.kind, Type::Zero) || value.kind == Type::Number(wanted) {
+        return Some(value);
+    }
+    let whole = Dimension::LENGTH.power(3, 1)?.over(Dimension::TIME);
+    let (per, by) = match checker.axes.len() {
+        1 => (" and square metre across the line", "cross-section: `rate Q / (20 m^2)`"),
+        2 => (" and metre of the axis that the domain does not have", "thickness: `rate Q / (10 m)`"),
+        _ => ("", ""),
+    };
+    let message =
+        Diagnostic::error(U104, format!("the rate of well `{}` has the wrong dimension", well.name.value))
+            .at(written.span, format!("this is {}", value.kind.describe()))
+            .found(value.kind.describe())
+            .expected(format!("water per time{per} ({})", wanted.unit_text()));
+    checker.report(match value.kind == Type::Number(whole) {
+        true => message.help(format!("divide it by the {by}")),
+        false => message,
+    });
+    None
 }
 
 /// A value that may change in time.

@@ -13,15 +13,19 @@ use super::sides::side_words;
 use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{D009, M001, M002};
 use crate::source::Span;
-use crate::syntax::tree::{FileEntry, FileValue, Name, Text};
+use crate::syntax::tree::{Column, FileEntry, FileValue, Name, Text};
 use crate::units::Dimension;
 
 /// Flow from files in a scenario.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FileFlow {
     pub file: FlowFile,
-    /// Where each file is named.
+    /// Where each file is named, …
     pub spans: Vec<Span>,
+    /// … and each package whose side is given, in their order.
+    pub package_spans: Vec<Span>,
+    /// Where a column is said to hold the porosity.
+    pub porosity_span: Option<Span>,
     /// Filled in by whoever reads the files.
     pub facts: Option<FlowFacts>,
 }
@@ -125,7 +129,10 @@ pub fn file<'a>(
         wanted.iter().map(|name| checker.data_file(name)).collect::<Vec<_>>().into_iter().collect();
     let (form, files) = (form?, files?);
     let spans = wanted.iter().map(|name| name.span).collect();
-    is_right.then_some(FileFlow { file: FlowFile { form, files }, spans, facts: None })
+    let package_spans = entries.packages().map(|(_, package)| package.name.span).collect();
+    let porosity_span = entries.get(Entry::Porosity).map(|entry| entry.word.span);
+    let file = FlowFile { form, files };
+    is_right.then_some(FileFlow { file, spans, package_spans, porosity_span, facts: None })
 }
 
 impl<'a> Entries<'a> {
@@ -283,17 +290,23 @@ impl<'a> Entries<'a> {
 
     fn sides(&self, checker: &mut Checker<'a>) -> Option<Vec<(String, usize)>> {
         let indices: Vec<usize> = checker.axes.iter().map(|(_, index)| *index).collect();
-        let mut sides: Vec<(String, usize)> = Vec::new();
         for (entry, written) in &self.list {
-            let Entry::Side(side) = *entry else { continue };
-            let FileValue::Columns(packages) = &written.value else {
+            if matches!(entry, Entry::Side(_)) && !matches!(written.value, FileValue::Columns(_)) {
                 return wrong_value(checker, written, "names of packages", "top RCH, EVT");
-            };
-            for package in packages {
-                let side = 2 * indices[side / 2] + side % 2;
-                sides.push((package.name.value.clone(), side));
             }
         }
-        Some(sides)
+        let of_grid = |side: usize| 2 * indices[side / 2] + side % 2;
+        Some(self.packages().map(|(side, package)| (package.name.value.clone(), of_grid(side))).collect())
+    }
+
+    /// Packages that are named at sides: the side of the domain and the name.
+    fn packages(&self) -> impl Iterator<Item = (usize, &'a Column)> {
+        self.list.iter().flat_map(|(entry, written)| {
+            let (side, names) = match (entry, &written.value) {
+                (Entry::Side(side), FileValue::Columns(names)) => (*side, &names[..]),
+                _ => (0, &[][..]),
+            };
+            names.iter().map(move |name| (side, name))
+        })
     }
 }

@@ -174,6 +174,22 @@ pub fn porosity<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> O
     Some(Some(Spanned::new(porosity?, span)))
 }
 
+/// A column of porosity and a statement of it say two things.
+pub fn one_porosity(checker: &mut Checker<'_>, statements: &Statements<'_>, flow: Option<&Spanned<Flow>>) {
+    let (Some((medium, _)), Some(Spanned { value: Flow::File(file), .. })) = (statements.medium, flow) else {
+        return;
+    };
+    let (Some(column), Some(named)) = (file.porosity_span, file.file.files.first()) else { return };
+    checker.report(
+        Diagnostic::error(M002, "the porosity is given twice")
+            .at(medium, "by this statement")
+            .also(column, format!("and by a column of \"{}\"", named.name))
+            .found("two porosities")
+            .expected("one porosity")
+            .help("leave out the `medium`, or the `porosity` of the flow"),
+    );
+}
+
 fn read_porosity<'a>(checker: &mut Checker<'a>, written: &'a tree::Expr) -> Option<Expr> {
     let value = checker.check(written, Allow::PLACE)?;
     checker.expect_dimension(written, &value, "the porosity", &[Dimension::NONE])?;

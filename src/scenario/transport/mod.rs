@@ -18,6 +18,7 @@ pub(super) mod sides;
 pub(super) mod source;
 
 pub use file::FileFlow;
+pub use sides::side_names;
 
 use super::choice::Covariance;
 use super::expression::Expr;

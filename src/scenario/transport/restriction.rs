@@ -129,16 +129,25 @@ fn of_fluid(checker: &mut Checker<'_>, scenario: &Scenario) {
     {
         wrong.push(("wells that carry something", carried.span, MASSES));
     }
-    for (what, span, help) in wrong {
-        checker.report(
-            Diagnostic::error(M026, format!("fluid particles have no {what}"))
-                .at(span, "not with particles of fluid")
-                .also(scenario.particles.kind_span, "particles of fluid")
-                .found(what)
-                .expected("what parcels of water can do")
-                .help(help),
-        );
+    // What one edit mends is one mistake.
+    let (of_masses, others): (Vec<_>, Vec<_>) = wrong.into_iter().partition(|(_, _, help)| *help == MASSES);
+    let names: Vec<&str> = of_masses.iter().map(|(what, ..)| *what).collect();
+    if let Some(((_, span, help), rest)) = of_masses.split_first() {
+        let message = no_fluid(scenario, &names.join(", no "), *span, help);
+        checker.report(rest.iter().fold(message, |message, (_, span, _)| message.also(*span, "nor this")));
     }
+    for (what, span, help) in others {
+        checker.report(no_fluid(scenario, what, span, help));
+    }
+}
+
+fn no_fluid(scenario: &Scenario, what: &str, span: Span, help: &str) -> Diagnostic {
+    Diagnostic::error(M026, format!("fluid particles have no {what}"))
+        .at(span, "not with particles of fluid")
+        .also(scenario.particles.kind_span, "particles of fluid")
+        .found(what)
+        .expected("what parcels of water can do")
+        .help(help)
 }
 
 /// Outputs of what passes need water that is followed on its way, and amounts that are carried.

@@ -6,7 +6,7 @@
 use super::super::check::{Allow, Checker};
 use super::super::choice::Side;
 use super::super::collect::Statements;
-use super::super::model::species_index;
+use super::super::model::{CONCENTRATIONS, species_index};
 use super::super::{Axis, Domain};
 use super::{Patch, SideRule};
 use crate::diagnostic::codes::{M001, M002, M004, M007, M027};
@@ -392,14 +392,15 @@ pub fn concentrations<'a>(
             );
             is_right = false;
         }
+        let what = format!("the concentration of `{}`", assignment.name.value);
         let Some(dimension) = checker.concentration_of(species) else {
+            checker.expect_dimension(&assignment.value, &value, &what, &CONCENTRATIONS);
             is_right = false;
             continue;
         };
-        let what = format!("the concentration of `{}`", assignment.name.value);
         is_right &= checker.expect_dimension(&assignment.value, &value, &what, &[dimension]).is_some();
         if let Some(constant) = value.value() {
-            let found = format!("{} (SI)", precise(constant));
+            let found = checker.shown(constant, dimension, assignment.value.span);
             is_right &= checker
                 .require(constant >= 0.0, &what, found, "zero or more", assignment.value.span)
                 .is_some();

@@ -164,8 +164,14 @@ fn strength<'a>(checker: &mut Checker<'a>, written: &'a tree::Assignment) -> Opt
     let species = species_index(checker, &written.name);
     let value = checker.check(&written.value, Allow::TIME);
     let (species, value) = (species?, value?);
-    let concentration = checker.concentration_of(species)?;
     let n_axes = checker.axes.len();
+    let Some(concentration) = checker.concentration_of(species) else {
+        if value.kind != Type::Zero && concentration_for(value.kind, n_axes).is_none() {
+            let molar = dimensions(Dimension::MOLAR_CONCENTRATION, n_axes);
+            report_dimension(checker, written, value.kind, molar, n_axes);
+        }
+        return None;
+    };
     let wanted = dimensions(concentration, n_axes);
     let what = format!("what the source gives of `{}`", written.name.value);
     let found = match value.kind {
@@ -179,7 +185,8 @@ fn strength<'a>(checker: &mut Checker<'a>, written: &'a tree::Assignment) -> Opt
     };
     let constant = value.value();
     if let Some(number) = constant {
-        let shown = format!("{} (SI)", precise(number));
+        let dimension = value.kind.dimension().unwrap_or_default();
+        let shown = checker.shown(number, dimension, written.value.span);
         checker.require(number >= 0.0, &what, shown, "zero or more", written.value.span)?;
     }
     let strength = match (found, constant) {

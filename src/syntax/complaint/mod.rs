@@ -41,6 +41,7 @@ impl<'t> Stop<'t> {
     fn complain(&self) -> Diagnostic {
         None.or_else(|| self.detached_fraction())
             .or_else(|| self.broken_unit())
+            .or_else(|| self.parted_word())
             .or_else(|| self.misspelt_word())
             .or_else(|| self.open_bracket())
             .or_else(|| self.lone_bracket())
@@ -193,6 +194,27 @@ impl<'t> Stop<'t> {
         let ends_open = !self.is_kind(last, TokenKind::Word) && self.word(last) != "%";
         (is_unit && is_glued && !ends_open && !is_no_unit(self.word(last)))
             .then(|| (self.span(self.before[number]), self.span(first).to(self.span(last))))
+    }
+
+    /// Two words of one line that are one with `_` between them, as `no flow`.
+    fn parted_word(&self) -> Option<Diagnostic> {
+        let at = self.at?;
+        let next = (at + 1..self.lexed.tokens.len()).find(|&idx| self.lexed.is_significant(idx));
+        let pairs = [(self.before.last().copied(), Some(at)), (Some(at), next)];
+        pairs.into_iter().find_map(|(first, second)| {
+            let (first, second) = first.zip(second)?;
+            let joined = format!("{}_{}", self.word(first), self.word(second));
+            let is_parted = (first..second).any(|idx| self.is_kind(idx, TokenKind::Newline));
+            let meant =
+                clause_words(self.keyword()).iter().find(|word| **word == joined).filter(|_| !is_parted)?;
+            let found = format!("`{} {}`", self.word(first), self.word(second));
+            let diagnostic = Diagnostic::error(codes::S001, format!("{found} is one word here"))
+                .at(self.span(first).to(self.span(second)), format!("did you mean `{meant}`?"))
+                .found(found)
+                .expected(format!("`{meant}`"))
+                .help(format!("write `{meant}`"));
+            Some(diagnostic)
+        })
     }
 
     /// The word at the stop or the one before it resembles a word of this statement.

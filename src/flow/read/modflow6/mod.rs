@@ -102,6 +102,10 @@ pub struct Package {
     pub sinks: Range<usize>,
     /// Water that enters through outer faces, m³/s, less what leaves there.
     pub through_faces: f64,
+    /// Cells that it lists; 0 of what is stored.
+    pub n_cells: usize,
+    /// The outer sides of the grid, two per axis, that all of these cells touch.
+    pub touches: [bool; 6],
 }
 
 /// The flows of a model.

@@ -248,7 +248,8 @@ impl Model<'_> {
             self.add_sink(flow, (owner, text), cell, rate)?;
         }
         let (kind, name) = (text.to_owned(), String::new());
-        Ok(Package { kind, name, sinks: start..flow.sinks.len(), through_faces: 0.0 })
+        let sinks = start..flow.sinks.len();
+        Ok(Package { kind, name, sinks, through_faces: 0.0, n_cells: 0, touches: [false; 6] })
     }
 
     fn package(
@@ -266,8 +267,13 @@ impl Model<'_> {
                 name.eq_ignore_ascii_case(&list.package) || name.eq_ignore_ascii_case(text)
             });
         let mut through_faces = 0.0;
+        let (mut n_cells, mut touches) = (0, [true; 6]);
         for entry in list.entries() {
             let cell = self.cell(entry.cell, text)?;
+            n_cells += 1;
+            for (idx, touches) in touches.iter_mut().enumerate() {
+                *touches &= self.outer_face(cell, Side { axis: idx / 2, is_upper: idx % 2 == 1 }).is_some();
+            }
             let side = match (by_flow, by_path) {
                 (Some(column), _) => Side::of_iflowface(entry.column(column)),
                 (None, Some(column)) => Side::of_iface(entry.column(column)),
@@ -286,7 +292,8 @@ impl Model<'_> {
             }
         }
         let (kind, name) = (text.to_owned(), list.package.clone());
-        Ok(Package { kind, name, sinks: start..flow.sinks.len(), through_faces })
+        let touches = touches.map(|touches| touches && n_cells > 0);
+        Ok(Package { kind, name, sinks: start..flow.sinks.len(), through_faces, n_cells, touches })
     }
 
     /// The face of a cell on a side, if it is one of the grid's outer faces, and the sign of what flows in.
