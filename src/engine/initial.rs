@@ -30,7 +30,13 @@ pub fn blocks<const D: usize>(
         let mut block = Block::<D>::new(idx, n_in_block, program.n_columns())
             .map_err(|_| RunError::OutOfMemory { bytes })?;
         match cells {
-            None => place(&plan.axes, (plan.particles.placement, plan.particles.disorder), &strata, plan.seed, &mut block),
+            None => place(
+                &plan.axes,
+                (plan.particles.placement, plan.particles.disorder),
+                &strata,
+                plan.seed,
+                &mut block,
+            ),
             Some(cells) => water::start::place(plan, cells, &mut block),
         }
         if plan.transport.is_some() {

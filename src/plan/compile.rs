@@ -96,7 +96,10 @@ fn compile_from(
     let scales = TimeScales::of(&plan);
     let mut draft = Draft { plan, evaluation, left_out: Vec::new() };
     if scenario.exchange.as_ref().is_some_and(|exchange| exchange.mixing_fraction == 0.0) {
-        draft.leave_out("exchange between parcels", "none of the dispersion is exchange: mixing_fraction is 0");
+        draft.leave_out(
+            "exchange between parcels",
+            "none of the dispersion is exchange: mixing_fraction is 0",
+        );
     }
     if let Err(reason) = draft.plan.check() {
         panic!("lowering made a plan that is not well-formed: {reason}");

@@ -43,16 +43,10 @@ pub fn lower(scenario: &Scenario) -> Result<Lowered, Vec<Diagnostic>> {
         Some(transport) if transport.is_of_fluid => shares::mean(&transport.porosity, &axes),
         _ => lower_transport::porosity_of_fluid(scenario),
     };
-    let volume = extent * porosity;
     let mut plan = Plan {
         numerics: NUMERICS_VERSION,
         walk: walk(scenario),
-        particles: Particles {
-            count: scenario.particles.count,
-            placement: scenario.particles.placement,
-            disorder: scenario.particles.disorder,
-            volume: volume / scenario.particles.count as f64,
-        },
+        particles: particles(scenario, extent * porosity),
         species,
         components,
         mixing: scenario.mixing.as_ref().map(lower_mixing),
@@ -91,6 +85,17 @@ pub fn lower(scenario: &Scenario) -> Result<Lowered, Vec<Diagnostic>> {
         plan.stages.insert(1, Stage::React);
     }
     Ok((plan, evaluation, warnings))
+}
+
+/// A parcel is its share of the water.
+fn particles(scenario: &Scenario, water: f64) -> Particles {
+    let written = &scenario.particles;
+    Particles {
+        count: written.count,
+        placement: written.placement,
+        disorder: written.disorder,
+        volume: water / written.count as f64,
+    }
 }
 
 /// A step as a scene without passes takes it.

@@ -32,7 +32,12 @@ pub fn plan() -> Plan {
         numerics: 1,
         axes: vec![axis(0, 0.075), axis(1, 0.01)],
         walk: Walk { drift: vec![0.0; 2], spread: vec![1e-4, 0.0, 1e-4], normals: Normals::Single },
-        particles: Particles { count: 4, placement: Placement::Stratified, volume: 0.003 / 4.0 },
+        particles: Particles {
+            count: 4,
+            placement: Placement::Stratified,
+            disorder: 0.0,
+            volume: 0.003 / 4.0,
+        },
         species: vec![species("A", true), species("B", true), species("biomass", false)],
         components: Vec::new(),
         mixing: None,

@@ -8,8 +8,8 @@ use super::flock;
 use super::pace::Pace;
 use super::parts::Deep;
 use super::place::{Faces, Place};
-use crate::plan::{Particles, Placement};
 use crate::plan::tape::Tape;
+use crate::plan::{Particles, Placement};
 use crate::state::stream::Stream;
 use std::ops::Range;
 

@@ -5,8 +5,8 @@
 use super::super::mass::place::Cells;
 use super::super::mass::release::Sampling;
 use super::super::mass::world::Site;
-use crate::plan::tape::Operation;
 use crate::plan::Plan;
+use crate::plan::tape::Operation;
 use crate::state::grid::Grid;
 use crate::state::particles::Block;
 use crate::state::stream::{Purpose, Stream};

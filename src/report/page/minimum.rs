@@ -33,6 +33,9 @@ struct Least {
     from_to: (f64, f64),
 }
 
+/// Values of other axes, and the minima over one more.
+type Course = (Vec<(usize, Option<f64>)>, Vec<(f64, Least)>);
+
 /// A measure along an axis.
 struct Valley<'a> {
     study: &'a Study,
@@ -132,7 +135,7 @@ impl<'a> Valley<'a> {
     /// Places of minima over another axis, a series for each combination of the others.
     fn moves(&self, over: usize) -> String {
         let (axis, along) = (&self.study.axes[self.axis], &self.study.axes[over]);
-        let mut courses: Vec<(Vec<(usize, Option<f64>)>, Vec<(f64, Least)>)> = Vec::new();
+        let mut courses: Vec<Course> = Vec::new();
         for (group, least) in self.groups.iter().zip(&self.least) {
             let own = group.shared.iter().find(|(idx, _)| *idx == over).and_then(|(_, value)| *value);
             let (Some(own), Some(least)) = (own.filter(|own| *own > 0.0), least) else { continue };
@@ -163,7 +166,8 @@ impl<'a> Valley<'a> {
             marks.push(Mark { points: line, color, look: marker(slot) });
             key.push(key_entry(slot, series::name(self.study, shared)));
         }
-        let panel = log_panel(label(&along.name, &x), format!("{} where it is least", label(&axis.name, &y)), marks);
+        let panel =
+            log_panel(label(&along.name, &x), format!("{} where it is least", label(&axis.name, &y)), marks);
         sheet(None, key, &[panel], (760.0, 400.0), 1)
     }
 
@@ -175,7 +179,8 @@ impl<'a> Valley<'a> {
                 Some(least) => {
                     let between = least.between.map(|place| with_unit(place, unit));
                     let ends = (with_unit(least.from_to.0, unit), with_unit(least.from_to.1, unit));
-                    let error = least.value.standard_error().map(|error| format!(" ± {}", with_unit(error, "1")));
+                    let error =
+                        least.value.standard_error().map(|error| format!(" ± {}", with_unit(error, "1")));
                     cells.push(with_unit(least.at, unit));
                     cells.push(between.unwrap_or_else(|| "an end of the range".to_owned()));
                     cells.push(format!("{} … {}", ends.0, ends.1));
@@ -292,7 +297,7 @@ mod tests {
     /// y = 2 (x/3)^(ln(x/3)): a parabola in logarithms with its vertex at 3.
     #[test]
     fn the_vertex_of_a_parabola_is_found() {
-        let y = |x: f64| 2.0 * ((x / 3.0).ln() * (x / 3.0).ln()).exp();
+        let y = |x: f64| 2.0 * exp(ln(x / 3.0) * ln(x / 3.0));
         let points: Vec<_> = [0.5, 1.0, 2.0, 5.0, 9.0].map(|x| (x, moments(&[y(x)]))).to_vec();
         let found = least(&points).unwrap();
         assert_eq!(found.at, 2.0);
