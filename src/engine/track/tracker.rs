@@ -4,7 +4,7 @@
 //! nothing: a group comes in, and goes on or leaves.
 
 use super::drains::Drain;
-use super::interfaces::Interface;
+use super::interfaces::Interfaces;
 use super::lanes::{LANES, Lane, Lanes};
 use super::medium::{Carrier, Criteria, Leap, Medium};
 use super::monitors::{Crossing, Gap, Plane};
@@ -26,7 +26,8 @@ pub struct Tracker<const D: usize, M: Medium<D>> {
     pub ends: [Ends<D>; D],
     /// Boxes that water is taken from.
     pub drains: Vec<Drain<D>>,
-    pub interfaces: Vec<Interface>,
+    /// Where coefficients jump, axis by axis.
+    pub interfaces: Vec<Interfaces>,
     pub planes: Vec<Plane<D>>,
     /// Parts of sides that are watched; what leaves through one crosses the plane of a number behind those of planes.
     pub gaps: Vec<Gap<D>>,
@@ -213,8 +214,8 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
             step: number,
         };
         self.medium.settle(&stride, lanes);
-        for (idx, interface) in self.interfaces.iter().enumerate() {
-            interface.apply(idx, &stride, lanes);
+        for interfaces in &self.interfaces {
+            interfaces.apply(&stride, lanes);
         }
         let free = (!self.planes.is_empty()).then_some(lanes.positions);
         for (axis, ends) in self.ends.iter().enumerate() {
