@@ -7,7 +7,7 @@ use super::super::calendar::Calendar;
 use super::super::error::RunError;
 use super::super::program::unsound;
 use super::super::track::interfaces::Interfaces;
-use super::super::track::medium::{Carrier, Criteria, Medium};
+use super::super::track::medium::{Carrier, Medium};
 use super::super::track::noise::Draws;
 use super::super::track::tracker::Tracker;
 use super::super::track::walls::Ends;
@@ -117,24 +117,17 @@ impl<'a, const D: usize> Site<'a, D> {
             ends.push(self.ends(axis)?);
         }
         let ends: [Ends<D>; D] = ends.try_into().map_err(|_| unsound("sides that do not fit the axes"))?;
-        let periods: [_; D] = std::array::from_fn(|axis| match ends[axis] {
-            Ends::Periodic { low, high } => Some((low, high)),
-            Ends::Walls(_) => None,
-        });
         let planes: Vec<(usize, f64)> =
             self.transport.interfaces.iter().map(|interface| (interface.axis, interface.at)).collect();
         Ok(Tracker {
             medium,
+            interfaces: Interfaces::of_axes(&planes, &ends),
             ends,
             planes: Vec::new(),
             gaps: Vec::new(),
             drains: self.drains(0),
             draws: Draws::new(self.plan.seed, D, is_double),
-            interfaces: Interfaces::of_axes(&planes, periods),
-            criteria: self
-                .transport
-                .sub_steps
-                .map(|sub| Criteria { courant: sub.courant, dispersion: sub.dispersion }),
+            criteria: self.criteria(),
             width,
         })
     }
