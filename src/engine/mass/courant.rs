@@ -7,11 +7,13 @@ use super::super::track::medium::Criteria;
 use super::world::Site;
 use crate::flow::FaceFlow;
 
-/// What particles keep where a step without criteria is too long: the same as with `step auto`.
-const USUAL: Criteria = Criteria { courant: 0.5, dispersion: 0.1 };
+/// Courant number up to which a step without criteria is one displacement.
+const LONG: f64 = 0.5;
+/// What particles keep where it is longer.
+const USUAL: Criteria = Criteria { courant: 0.25, dispersion: 0.1 };
 
 impl<const D: usize> Site<'_, D> {
-    /// How particles divide steps: as the scene says, or by the usual criteria where a step of its own would carry water
+    /// How particles divide steps: as the scene says, or by criteria of ours where a step would carry water
     /// through more than half a cell, or renew more than half of a cell that a well takes water from.
     pub fn criteria(&self) -> Option<Criteria> {
         if let Some(sub) = self.transport.sub_steps {
@@ -19,7 +21,7 @@ impl<const D: usize> Site<'_, D> {
         }
         let periods = 0..self.starts.len();
         let worst = periods.map(|period| self.rate(period)).fold(0.0, f64::max);
-        (worst * self.plan.time.step > USUAL.courant).then_some(USUAL)
+        (worst * self.plan.time.step > LONG).then_some(USUAL)
     }
 
     /// The largest Courant number per time of a flow, 1/s.
