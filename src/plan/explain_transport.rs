@@ -56,6 +56,9 @@ pub(super) fn lines(plan: &Plan) -> Vec<String> {
         lines.push(line);
     }
     lines.push(match transport.sub_steps {
+        None if matches!(transport.flow, Flow::Darcy(_) | Flow::File(_)) => {
+            "steps: one displacement of each particle in a step, more if water crosses half a cell in one".to_owned()
+        }
         None => "steps: one displacement of each particle in a step".to_owned(),
         Some(sub_steps) => format!(
             "steps: each particle divides a step so that its Courant number is at most {} and its dispersion number at most {}",

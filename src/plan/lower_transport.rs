@@ -12,8 +12,8 @@ use super::periods::{Periods, TimedSide};
 use super::shares;
 use super::tape::{Binary, Operation, Tape};
 use super::transport::{
-    Change, Conductivity, Darcy, Decay, Dispersion, FileFlow, Flow, Interface, Patch, Population, Region,
-    SideRule, Source, Strength, Transport, Well,
+    Change, Changed, Conductivity, Darcy, Decay, Dispersion, FileFlow, Flow, Interface, Patch, Population,
+    Region, SideRule, Source, Strength, Transport, Well,
 };
 use crate::diagnostic::codes::R104;
 use crate::diagnostic::{Diagnostic, any_fatal};
@@ -98,7 +98,7 @@ impl Lowering<'_> {
         let is_on_cells = matches!(flow, Flow::Darcy(_) | Flow::File(_));
         // Cells have porosities of their own, and faces between them.
         let of_porosity = Some(&porosity).filter(|_| !is_on_cells);
-        let interfaces = self.interfaces(&dispersion, of_porosity);
+        let interfaces = self.interfaces(&jumping(&flow, &changes, &dispersion, of_porosity));
         let mut transport = Transport {
             flow,
             changes,
@@ -368,18 +368,17 @@ impl Lowering<'_> {
         Some(list)
     }
 
-    /// Planes at which a comparison of a coordinate with a number switches dispersion or porosity.
-    fn interfaces(&self, dispersion: &Dispersion, porosity: Option<&Tape>) -> Vec<Interface> {
-        let of_dispersion = if let Dispersion::Isotropic(tape) = dispersion { Some(tape) } else { None };
+    /// Planes at which a comparison of a coordinate with a number switches one of some coefficients.
+    fn interfaces(&self, coefficients: &[Coefficient]) -> Vec<Interface> {
         let mut list: Vec<Interface> = Vec::new();
-        for tape in of_dispersion.into_iter().chain(porosity) {
+        for &(tape, only) in coefficients {
             for (input, at) in tape.operations.iter().filter_map(|operation| threshold(tape, operation)) {
                 let Some(axis) = self.axes.iter().position(|axis| axis.index == usize::from(input)) else {
                     continue;
                 };
                 let is_inside = self.axes[axis].low < at && at < self.axes[axis].high;
                 let interface = Interface { axis, at };
-                if is_inside && !list.contains(&interface) {
+                if only.is_none_or(|only| only == axis) && is_inside && !list.contains(&interface) {
                     list.push(interface);
                 }
             }
@@ -387,6 +386,31 @@ impl Lowering<'_> {
         list.sort_by(|a, b| a.axis.cmp(&b.axis).then(a.at.total_cmp(&b.at)));
         list
     }
+}
+
+/// A coefficient, and the only axis across which its jumps count, if there is one.
+type Coefficient<'a> = (&'a Tape, Option<usize>);
+
+/// What may jump at a plane: dispersion, porosity, and the velocity through it; any velocity where dispersion follows it.
+fn jumping<'a>(
+    flow: &'a Flow,
+    changes: &'a [Change],
+    dispersion: &'a Dispersion,
+    porosity: Option<&'a Tape>,
+) -> Vec<Coefficient<'a>> {
+    let of_dispersion = if let Dispersion::Isotropic(tape) = dispersion { Some(tape) } else { None };
+    let mut list: Vec<Coefficient> =
+        of_dispersion.into_iter().chain(porosity).map(|tape| (tape, None)).collect();
+    let follows = matches!(dispersion, Dispersion::Velocity { .. });
+    let first = if let Flow::Expression(tapes) = flow { Some(tapes) } else { None };
+    let later = changes.iter().filter_map(|change| match &change.flow {
+        Changed::Expression(tapes) => Some(tapes),
+        _ => None,
+    });
+    for tapes in first.into_iter().chain(later) {
+        list.extend(tapes.iter().enumerate().map(|(axis, tape)| (tape, (!follows).then_some(axis))));
+    }
+    list
 }
 
 /// Whoever makes a plan of such a scene has to read its files before.

@@ -32,6 +32,10 @@ pub enum Purpose {
     /// Both on the way to a time between two steps.
     BridgeWait,
     BridgeTurn,
+    /// Walks through planes at which coefficients jump.
+    Interface,
+    /// The same on the way to a time between two steps.
+    BridgeInterface,
 }
 
 /// The generator of one purpose under one root seed.
@@ -56,6 +60,8 @@ impl Stream {
             Purpose::Turn => "turn",
             Purpose::BridgeWait => "bridge wait",
             Purpose::BridgeTurn => "bridge turn",
+            Purpose::Interface => "interface",
+            Purpose::BridgeInterface => "bridge interface",
         };
         let mut hasher = blake3::Hasher::new();
         hasher.update(b"lamella random stream 1\0");

@@ -5,6 +5,7 @@
 
 mod births;
 pub(super) mod book;
+mod courant;
 mod entry;
 pub(super) mod flock;
 pub(super) mod gate;

@@ -6,8 +6,8 @@
 use super::super::calendar::Calendar;
 use super::super::error::RunError;
 use super::super::program::unsound;
-use super::super::track::interfaces::Interface;
-use super::super::track::medium::{Carrier, Criteria, Medium};
+use super::super::track::interfaces::Interfaces;
+use super::super::track::medium::{Carrier, Medium};
 use super::super::track::noise::Draws;
 use super::super::track::tracker::Tracker;
 use super::super::track::walls::Ends;
@@ -116,23 +116,18 @@ impl<'a, const D: usize> Site<'a, D> {
         for axis in 0..D {
             ends.push(self.ends(axis)?);
         }
+        let ends: [Ends<D>; D] = ends.try_into().map_err(|_| unsound("sides that do not fit the axes"))?;
+        let planes: Vec<(usize, f64)> =
+            self.transport.interfaces.iter().map(|interface| (interface.axis, interface.at)).collect();
         Ok(Tracker {
             medium,
-            ends: ends.try_into().map_err(|_| unsound("sides that do not fit the axes"))?,
+            interfaces: Interfaces::of_axes(&planes, &ends),
+            ends,
             planes: Vec::new(),
             gaps: Vec::new(),
             drains: self.drains(0),
             draws: Draws::new(self.plan.seed, D, is_double),
-            interfaces: self
-                .transport
-                .interfaces
-                .iter()
-                .map(|interface| Interface { axis: interface.axis, at: interface.at })
-                .collect(),
-            criteria: self
-                .transport
-                .sub_steps
-                .map(|sub| Criteria { courant: sub.courant, dispersion: sub.dispersion }),
+            criteria: self.criteria(),
             width,
         })
     }

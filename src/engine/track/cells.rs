@@ -466,6 +466,14 @@ impl<const D: usize> Medium<D> for CellMedium<D> {
         f64::from(look.drift[axis][lane])
     }
 
+    fn tensor(&self, look: &Look<D>, lane: usize) -> [[f64; D]; D] {
+        let (along, across) = (f64::from(look.along[lane]), f64::from(look.across[lane]));
+        let n: [f64; D] = std::array::from_fn(|axis| f64::from(look.direction[axis][lane]));
+        let own = |i: usize, j: usize| if i == j { across * across } else { 0.0 };
+        let entry = |i: usize, j: usize| 0.5 * (own(i, j) + (along * along - across * across) * n[i] * n[j]);
+        std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)))
+    }
+
     fn porosity(&self, _: [f64; D]) -> f64 {
         1.0
     }

@@ -257,8 +257,16 @@ impl<const D: usize> Medium<D> for Formula<D> {
         look.drift[axis][lane]
     }
 
+    fn tensor(&self, look: &Look<D>, lane: usize) -> [[f64; D]; D] {
+        look.tensor(lane)
+    }
+
     fn porosity(&self, place: [f64; D]) -> f64 {
         self.evaluate(&self.porosity, &place.map(|x| [x; LANES]), &mut Vec::new()).value[0]
+    }
+
+    fn porosities(&self, places: &[Lane; D], porosity: &mut Lane) {
+        *porosity = self.evaluate(&self.porosity, places, &mut Vec::new()).value;
     }
 
     fn velocity(&self, place: [f64; D], axis: usize) -> f64 {

@@ -106,8 +106,18 @@ pub trait Medium<const D: usize>: Sync {
     /// Drift `A` of one particle along an axis, m/s.
     fn drift(&self, look: &Self::Look, axis: usize, lane: usize) -> f64;
 
+    /// Dispersion tensor of one particle, over R, m²/s.
+    fn tensor(&self, look: &Self::Look, lane: usize) -> [[f64; D]; D];
+
     /// Porosity at one place, up to a factor that is the same everywhere.
     fn porosity(&self, place: [f64; D]) -> f64;
+
+    /// The same at 64 places.
+    fn porosities(&self, places: &[Lane; D], porosity: &mut Lane) {
+        for lane in 0..LANES {
+            porosity[lane] = self.porosity(std::array::from_fn(|axis| places[axis][lane]));
+        }
+    }
 
     /// Velocity of the water along an axis at one place, m/s.
     fn velocity(&self, place: [f64; D], axis: usize) -> f64;

@@ -15,6 +15,7 @@ pub mod medium;
 pub mod monitors;
 pub mod noise;
 pub mod paths;
+pub mod skew;
 pub mod tracker;
 pub mod trips;
 pub mod turning;

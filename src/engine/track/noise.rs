@@ -4,12 +4,16 @@
 //! numbers: they follow from seed, particle and step.
 
 use super::lanes::{LANES, Lane};
+use super::trips::Numbers;
 use crate::maths::chacha::DRAW;
 use crate::maths::wide::Width;
 use crate::state::stream::{Purpose, Stream};
 
 /// Normal numbers that one draw has for each particle.
 pub const PER_DRAW: usize = DRAW / LANES;
+
+/// Two to this power is how many blocks of numbers an axis has in a displacement.
+const BLOCKS: u32 = 18;
 
 /// The normals of 64 particles, a row per number.
 #[derive(Debug, Clone)]
@@ -40,6 +44,7 @@ impl Normals {
 pub struct Draws {
     walk: Stream,
     wall: Stream,
+    interface: Stream,
     is_double: bool,
     /// Normals of a displacement.
     per_step: usize,
@@ -51,6 +56,7 @@ impl Draws {
         Self {
             walk: Stream::new(seed, Purpose::Track),
             wall: Stream::new(seed, Purpose::Wall),
+            interface: Stream::new(seed, Purpose::Interface),
             is_double,
             per_step: per_step.clamp(1, PER_DRAW),
         }
@@ -61,6 +67,7 @@ impl Draws {
         Self {
             walk: Stream::new(seed, Purpose::Bridge),
             wall: Stream::new(seed, Purpose::BridgeWall),
+            interface: Stream::new(seed, Purpose::BridgeInterface),
             ..Self::new(seed, per_step, is_double)
         }
     }
@@ -90,5 +97,10 @@ impl Draws {
     /// events of a displacement apart.
     pub fn uniforms(&self, id: u64, step: u64, what: u64) -> [f64; 8] {
         self.wall.uniforms_of(id, step * 64 + what)
+    }
+
+    /// Any number of them for what one particle does at the interfaces of an axis in one displacement.
+    pub fn at_interfaces(&self, id: u64, step: u64, axis: usize) -> Numbers<'_> {
+        Numbers::new(&self.interface, id, (step * 4 + axis as u64) << BLOCKS)
     }
 }

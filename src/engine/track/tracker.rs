@@ -4,7 +4,7 @@
 //! nothing: a group comes in, and goes on or leaves.
 
 use super::drains::Drain;
-use super::interfaces::Interface;
+use super::interfaces::Interfaces;
 use super::lanes::{LANES, Lane, Lanes};
 use super::medium::{Carrier, Criteria, Leap, Medium};
 use super::monitors::{Crossing, Gap, Plane};
@@ -26,7 +26,8 @@ pub struct Tracker<const D: usize, M: Medium<D>> {
     pub ends: [Ends<D>; D],
     /// Boxes that water is taken from.
     pub drains: Vec<Drain<D>>,
-    pub interfaces: Vec<Interface>,
+    /// Where coefficients jump, axis by axis.
+    pub interfaces: Vec<Interfaces>,
     pub planes: Vec<Plane<D>>,
     /// Parts of sides that are watched; what leaves through one crosses the plane of a number behind those of planes.
     pub gaps: Vec<Gap<D>>,
@@ -122,7 +123,7 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
                 }
             }
             match &self.criteria {
-                None => {
+                None if !self.is_cut() => {
                     if is_late {
                         bench.leap.assign(&left);
                     }
@@ -134,8 +135,8 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
                         bench.leap.assign(&[steps.dt; LANES]);
                     }
                 }
-                Some(criteria) => {
-                    self.sub_steps(carrier, criteria, (step, t, steps.dt), left, bench, events)?
+                criteria => {
+                    self.sub_steps(carrier, criteria.as_ref(), (step, t, steps.dt), left, bench, events)?
                 }
             }
             if bench.lanes.gone & bench.lanes.occupied() == bench.lanes.occupied() {
@@ -145,12 +146,42 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
         Ok(())
     }
 
+    /// Whether particles divide steps without criteria for it, too.
+    #[inline(always)]
+    pub(super) fn is_cut(&self) -> bool {
+        self.interfaces.iter().any(Interfaces::are_walled)
+    }
+
+    /// The longest displacements from the places that were looked at, in a step `dt`.
+    #[inline(always)]
+    pub(super) fn limit(
+        &self,
+        carrier: &Carrier,
+        criteria: Option<&Criteria>,
+        (look, positions): (&M::Look, &[Lane; D]),
+        dt: f64,
+        time: &mut Lane,
+    ) {
+        match criteria {
+            Some(criteria) => {
+                self.medium.longest(look, criteria, time);
+                for drain in &self.drains {
+                    drain.limit(carrier, criteria.courant, positions, time);
+                }
+            }
+            None => time.fill(dt),
+        }
+        for interfaces in &self.interfaces {
+            interfaces.limit((&self.medium, carrier, look), positions, dt, time);
+        }
+    }
+
     /// One step in sub-steps of each particle's own.
     #[inline(always)]
     fn sub_steps(
         &self,
         carrier: &Carrier,
-        criteria: &Criteria,
+        criteria: Option<&Criteria>,
         (step, t, dt): (u64, f64, f64),
         mut left: Lane,
         bench: &mut Bench<D, M>,
@@ -159,10 +190,7 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
         let mut time = [0.0; LANES];
         for sub_step in 0..MOST_SUB_STEPS {
             self.medium.look(carrier, &bench.lanes.positions, &mut bench.look);
-            self.medium.longest(&bench.look, criteria, &mut time);
-            for drain in &self.drains {
-                drain.limit(carrier, criteria.courant, &bench.lanes.positions, &mut time);
-            }
+            self.limit(carrier, criteria, (&bench.look, &bench.lanes.positions), dt, &mut time);
             let start: Lane = left.map(|left| t + dt - left);
             let mut is_going = 0_u64;
             for lane in 0..LANES {
@@ -213,8 +241,8 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
             step: number,
         };
         self.medium.settle(&stride, lanes);
-        for (idx, interface) in self.interfaces.iter().enumerate() {
-            interface.apply(idx, &stride, lanes);
+        for interfaces in &self.interfaces {
+            interfaces.apply(&stride, lanes);
         }
         let free = (!self.planes.is_empty()).then_some(lanes.positions);
         for (axis, ends) in self.ends.iter().enumerate() {

@@ -38,7 +38,7 @@ impl<'a> Numbers<'a> {
         self.numbers[self.used - 1]
     }
 
-    fn normal(&mut self) -> f64 {
+    pub fn normal(&mut self) -> f64 {
         let (a, b) = (self.uniform(), self.uniform());
         (-2.0 * ln(a)).sqrt() * cos(2.0 * std::f64::consts::PI * b)
     }

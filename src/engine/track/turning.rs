@@ -309,7 +309,8 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
         events: &mut impl Turns,
     ) -> Result<(), TooManySubSteps> {
         let chain = company.chain;
-        let is_single = self.criteria.is_none() && company.carriers.len() == 1;
+        let is_whole = self.criteria.is_none() && !self.is_cut();
+        let is_single = is_whole && company.carriers.len() == 1;
         for sub_step in 0..MOST_SUB_STEPS {
             let going = fates.going() & bench.lanes.occupied() & !bench.lanes.gone;
             if going == 0 {
@@ -319,11 +320,9 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
             let kind = fates.kind(chain, going);
             let carrier = &company.carriers[kind];
             self.medium.look(carrier, &bench.lanes.positions, &mut bench.look);
-            if let Some(criteria) = &self.criteria {
-                self.medium.longest(&bench.look, criteria, &mut fates.most);
-                for drain in &self.drains {
-                    drain.limit(carrier, criteria.courant, &bench.lanes.positions, &mut fates.most);
-                }
+            if !is_whole {
+                let at = (&bench.look, &bench.lanes.positions);
+                self.limit(carrier, self.criteria.as_ref(), at, dt, &mut fates.most);
             }
             if fates.number != Some(number / 8) {
                 fates.number = Some(number / 8);

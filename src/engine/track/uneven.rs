@@ -321,6 +321,10 @@ impl<const D: usize> Medium<D> for UnevenMedium<D> {
         f64::from(look.drift[axis][lane])
     }
 
+    fn tensor(&self, look: &Look<D>, lane: usize) -> [[f64; D]; D] {
+        look.tensor(lane)
+    }
+
     fn porosity(&self, place: [f64; D]) -> f64 {
         self.porosity[self.cell(place)]
     }

@@ -105,6 +105,13 @@ impl<const D: usize> Medium<D> for Uniform<D> {
         look.drift[axis]
     }
 
+    fn tensor(&self, look: &Constants<D>, _: usize) -> [[f64; D]; D] {
+        let entry = |i: usize, j: usize| -> f64 {
+            0.5 * (0..=i.min(j)).map(|k| look.spread[i][k] * look.spread[j][k]).sum::<f64>()
+        };
+        std::array::from_fn(|i| std::array::from_fn(|j| entry(i, j)))
+    }
+
     fn porosity(&self, _: [f64; D]) -> f64 {
         1.0
     }

@@ -57,6 +57,10 @@ impl<const D: usize, M: Medium<D>> Medium<D> for Pathed<D, M> {
         self.medium.drift(look, axis, lane)
     }
 
+    fn tensor(&self, look: &M::Look, lane: usize) -> [[f64; D]; D] {
+        self.medium.tensor(look, lane)
+    }
+
     fn porosity(&self, place: [f64; D]) -> f64 {
         self.medium.porosity(place)
     }

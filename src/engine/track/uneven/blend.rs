@@ -75,6 +75,10 @@ impl<const D: usize> Medium<D> for Blend<D> {
         self.cells.drift(&look.of_cells, axis, lane) + self.spreading.drift(&look.of_spreading, axis, lane)
     }
 
+    fn tensor(&self, look: &Looks<D>, lane: usize) -> [[f64; D]; D] {
+        look.of_spreading.tensor(lane)
+    }
+
     fn porosity(&self, place: [f64; D]) -> f64 {
         self.cells.porosity(place)
     }
