@@ -132,6 +132,9 @@ impl Trial {
 /// As few particles as the bins and the trial need, each of more fluid.
 fn shrink(plan: &mut Plan, particles: u64) {
     const PER_BIN: u64 = 100;
+    // A kernel is as long as in the scene: among few parcels it would reach none.
+    const EXCHANGING: u64 = 4_000;
+    let particles = if plan.exchange.is_some() { particles.max(EXCHANGING) } else { particles };
     let n_bins: u64 = plan.axes.iter().map(|axis| axis.bins as u64).product();
     let needed = if n_bins > 1 { n_bins.saturating_mul(PER_BIN) } else { 1 };
     let count = particles.max(needed).min(plan.particles.count);
