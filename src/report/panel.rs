@@ -54,7 +54,7 @@ impl Shape {
                 ];
                 let points: Vec<(f64, f64)> =
                     circle.concat().iter().map(|(dx, dy)| (x + dx, y + dy)).collect();
-                canvas.line(&points, pen);
+                canvas.line(&points, Pen { width: 1.2, ..pen });
             }
             Self::Diamond => canvas.area(&[(x, y - 4.3), (x + 4.3, y), (x, y + 4.3), (x - 4.3, y)], pen),
         }

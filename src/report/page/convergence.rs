@@ -7,11 +7,12 @@ use super::super::color::{FAINT, INK};
 use super::super::figure::sheet;
 use super::super::panel::{KeyEntry, Look, Mark};
 use super::super::sweep::{ExpectedOrder, SweepDescription, SweepReport};
+use super::along::{places, points_csv};
 use super::csv::{Csv, number};
 use super::html::{escape, figure, paragraph, table};
 use super::quantity::{self, interval, label, shown};
 use super::series::{self, Series, color, key_entry, log_panel, marker, slug};
-use super::stats::{Moments, Slope, fit};
+use super::stats::{Slope, fit};
 use super::study::Study;
 use crate::maths::scalar::{exp, ln};
 
@@ -53,7 +54,10 @@ pub fn convergence(
         let course = Course::new(study, &report.measure, column, axis, expected);
         body += &course.html();
         let stem = format!("{}-{}", slug(&report.measure), slug(against));
-        files.push((format!("convergence-{stem}.csv"), course.points_csv()));
+        files.push((
+            format!("convergence-{stem}.csv"),
+            points_csv(study, &report.measure, column, &course.groups),
+        ));
         files.push((format!("orders-{stem}.csv"), course.orders_csv()));
     }
     (body, files)
@@ -218,24 +222,6 @@ impl<'a> Course<'a> {
         table(&["series", "points", "order ± 95 %"], &rows) + &more
     }
 
-    fn points_csv(&self) -> String {
-        let study = self.study;
-        let mut heads: Vec<String> = vec!["point".to_owned()];
-        heads.extend(study.axes.iter().map(|axis| axis.name.clone()));
-        let endings = ["n", "mean", "standard_deviation", "standard_error"];
-        heads.extend(endings.map(|ending| format!("{}.{ending}", self.measure)));
-        let mut csv = Csv::new(&heads);
-        for (point_number, point) in self.groups.iter().flat_map(|group| &group.points) {
-            let moments = &point.values[self.column];
-            let mut cells = vec![point_number.to_string()];
-            cells.extend(point.axes.iter().map(|value| number(*value)));
-            cells.push(moments.n.to_string());
-            cells.extend([moments.mean(), moments.deviation(), moments.standard_error()].map(number));
-            csv.row(cells);
-        }
-        csv.text
-    }
-
     /// A row per series and one for all; values of the series' axes are empty there.
     fn orders_csv(&self) -> String {
         let study = self.study;
@@ -267,16 +253,6 @@ impl<'a> Course<'a> {
         row("all".to_owned(), vec![None; shared.len()], &self.common);
         csv.text
     }
-}
-
-/// Value of the axis and measure of the points that log axes can show.
-fn places<'a>(group: &'a Series, axis: usize, column: usize) -> impl Iterator<Item = (f64, Moments)> + 'a {
-    let place = move |point: &super::study::PointSummary| {
-        let x = point.axes.get(axis).copied().flatten()?;
-        let moments = *point.values.get(column)?;
-        (x > 0.0 && moments.mean > 0.0).then_some((x, moments))
-    };
-    group.points.iter().filter_map(move |(_, point)| place(point))
 }
 
 /// The two ends of a fitted line over the places of its points.

@@ -7,6 +7,7 @@ use super::super::color::INK;
 use super::super::figure::sheet;
 use super::super::panel::{Look, Mark, Shape};
 use super::super::sweep::SweepReport;
+use super::along::{places, points_csv};
 use super::csv::{Csv, number};
 use super::html::{escape, figure, paragraph, table};
 use super::quantity::{label, shown, with_unit};
@@ -61,7 +62,10 @@ pub fn minimum(study: &Study, report: &SweepReport) -> (String, Vec<(String, Str
         let valley = Valley::new(study, &report.measure, column, axis);
         body += &valley.html(&by);
         let stem = format!("{}-{}", slug(&report.measure), slug(against));
-        files.push((format!("minimum-{stem}.csv"), valley.points_csv()));
+        files.push((
+            format!("minimum-{stem}.csv"),
+            points_csv(study, &report.measure, column, &valley.groups),
+        ));
         files.push((format!("minima-{stem}.csv"), valley.minima_csv()));
     }
     (body, files)
@@ -74,7 +78,8 @@ impl<'a> Valley<'a> {
         let mut groups = series::series(study, &others);
         let place = |point: &PointSummary| point.axes[axis].unwrap_or(f64::NAN);
         groups.iter_mut().for_each(|group| group.points.sort_by(|a, b| place(a.1).total_cmp(&place(b.1))));
-        let least = groups.iter().map(|group| least(&places(group, axis, column))).collect();
+        let least =
+            groups.iter().map(|group| least(&places(group, axis, column).collect::<Vec<_>>())).collect();
         Self { study, measure, column, axis, groups, least }
     }
 
@@ -111,7 +116,7 @@ impl<'a> Valley<'a> {
         let slots = series::slots(self.groups.len());
         for (idx, group) in self.groups.iter().enumerate() {
             let Some(slot) = slots[idx] else { continue };
-            let mine = places(group, self.axis, self.column);
+            let mine: Vec<_> = places(group, self.axis, self.column).collect();
             let means: Vec<(f64, f64)> = mine.iter().map(|(place, own)| at(*place, own.mean)).collect();
             let bars = mine.iter().filter_map(|(place, own)| {
                 let error = own.standard_error()?;
@@ -200,24 +205,6 @@ impl<'a> Valley<'a> {
         table(&["series", &at, "between points", "as good", self.measure], &rows) + &more
     }
 
-    fn points_csv(&self) -> String {
-        let study = self.study;
-        let mut heads: Vec<String> = vec!["point".to_owned()];
-        heads.extend(study.axes.iter().map(|axis| axis.name.clone()));
-        let endings = ["n", "mean", "standard_deviation", "standard_error"];
-        heads.extend(endings.map(|ending| format!("{}.{ending}", self.measure)));
-        let mut csv = Csv::new(&heads);
-        for (point_number, point) in self.groups.iter().flat_map(|group| &group.points) {
-            let moments = &point.values[self.column];
-            let mut cells = vec![point_number.to_string()];
-            cells.extend(point.axes.iter().map(|value| number(*value)));
-            cells.push(moments.n.to_string());
-            cells.extend([moments.mean(), moments.deviation(), moments.standard_error()].map(number));
-            csv.row(cells);
-        }
-        csv.text
-    }
-
     fn minima_csv(&self) -> String {
         let study = self.study;
         let shared: Vec<usize> =
@@ -244,16 +231,6 @@ impl<'a> Valley<'a> {
         }
         csv.text
     }
-}
-
-/// Value of the axis and measure of the points that log axes can show, by place.
-fn places(group: &Series, axis: usize, column: usize) -> Vec<(f64, Moments)> {
-    let place = |point: &PointSummary| {
-        let x = point.axes.get(axis).copied().flatten()?;
-        let moments = *point.values.get(column)?;
-        (x > 0.0 && moments.mean > 0.0).then_some((x, moments))
-    };
-    group.points.iter().filter_map(|(_, point)| place(point)).collect()
 }
 
 /// The least of points in the order of their places.

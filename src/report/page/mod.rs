@@ -3,6 +3,7 @@
 //! Owns the order of the sections. May use the tables, `sweep.json`, `plan.yaml`, the crate, and the
 //! figures of `report`. It deliberately runs nothing and judges nothing: the same folder gives the same bytes.
 
+mod along;
 mod balance;
 mod bands;
 mod budget;
