@@ -15,6 +15,7 @@ use super::release::Birth;
 use super::run::Run;
 use super::turn::{OnTurning, Pass};
 use super::units::Units;
+use std::cmp::Reverse;
 
 /// What came of a group of blocks.
 pub struct Yield<const D: usize> {
@@ -43,9 +44,12 @@ impl<const D: usize, M: Medium<D>> Run<'_, D, M> {
     pub fn move_flocks(&mut self, steps: Steps) -> Result<(), RunError> {
         let (tracker, carriers, units, benches) = (&self.tracker, &self.carriers, &self.units, &self.benches);
         let company = self.chain.as_ref().map(|chain| Company { chain, carriers: &self.paces });
-        let mut tasks: Vec<(&mut Flock<D>, Yield<D>)> =
-            self.flocks.iter_mut().map(|flock| (flock, Yield::default())).collect();
-        parallel::for_each(&mut tasks, &|_, (flock, found)| {
+        let mut tasks: Vec<(usize, &mut Flock<D>, Yield<D>)> =
+            self.flocks.iter_mut().enumerate().map(|(idx, flock)| (idx, flock, Yield::default())).collect();
+        // What took most displacements the last time begins first; any order gives the same bytes.
+        let last = &self.last_displacements;
+        tasks.sort_by_key(|(idx, ..)| Reverse(last.get(*idx).copied().unwrap_or(0)));
+        parallel::for_each(&mut tasks, &|_, (_, flock, found)| {
             let turning = company.filter(|company| company.chain.turns(flock.population));
             if turning.is_none() && carriers[flock.population].mobility == 0.0 {
                 return;
@@ -75,7 +79,9 @@ impl<const D: usize, M: Medium<D>> Run<'_, D, M> {
                 },
             );
         });
-        let found: Vec<Yield<D>> = tasks.into_iter().map(|(_, found)| found).collect();
+        tasks.sort_unstable_by_key(|(idx, ..)| *idx);
+        let found: Vec<Yield<D>> = tasks.into_iter().map(|(.., found)| found).collect();
+        self.last_displacements = found.iter().map(|found| found.displacements).collect();
         let mut moved = Vec::new();
         for mut found in found {
             moved.append(&mut found.moved);

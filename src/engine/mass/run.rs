@@ -55,6 +55,8 @@ pub struct Run<'a, const D: usize, M: Medium<D>> {
     pub gates: Gates,
     pub benches: Pool<Bench<D, M>>,
     pub displacements: u64,
+    /// By flock, in the last steps: only to begin with the dearest.
+    pub last_displacements: Vec<u64>,
     /// Absent where it does not matter how particles lie in memory.
     order: Option<Order<D>>,
     /// The number of the flow.
@@ -163,6 +165,7 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
             flocks: Vec::new(),
             benches: Pool::new(),
             displacements: 0,
+            last_displacements: Vec::new(),
             order: Order::new(site),
             period: 0,
             site,
