@@ -11,7 +11,7 @@ use super::conserved;
 use super::control::{Control, Settings};
 use super::error::RunError;
 use super::exchange::Exchange;
-use super::mass::gate::Gates;
+use super::mass::{gate::Gates, media::flow_of};
 use super::observe::{self, Instant, Lab};
 use super::parallel::{self, Pool};
 use super::program::{Program, Work};
@@ -135,6 +135,9 @@ pub fn run<const D: usize>(
 impl<'a, const D: usize> Run<'a, D> {
     /// Outputs of what passes places leave `dues`.
     fn new(plan: &'a Plan, settings: &Settings, dues: &mut Vec<Due>) -> Result<Self, RunError> {
+        // A flow is solved or read once.
+        let solved = plan.transport.as_ref().map(|_| flow_of(plan, settings)).transpose()?.flatten();
+        let settings = &Settings { flow: solved, ..settings.clone() };
         let mut program = Program::<D>::new(plan)?;
         program.mover.takes_half_draws = settings.takes_half_draws;
         let width = if settings.is_narrow { Width::baseline() } else { Width::widest() };
@@ -156,7 +159,7 @@ impl<'a, const D: usize> Run<'a, D> {
         let n_groups = blocks.len().div_ceil(blocks_per_group);
         let groups = (0..n_groups).map(|_| Group::default()).collect();
         Ok(Self {
-            exchange: Exchange::new(&program)?,
+            exchange: Exchange::new(&program, settings)?,
             width,
             walk: Stream::new(plan.seed, Purpose::Walk),
             bridge: Stream::new(plan.seed, Purpose::Bridge),

@@ -24,8 +24,8 @@ pub(super) struct Chosen {
 /// - Equation: `Δt = n min(C / Σ_i |v_i|/Δ_i, F / Σ_i D/Δ_i²)`, at most the duration `T`, then shortened so that
 ///   `T/Δt` is whole.
 /// - Symbols: `C` bound of the Courant number, `F` that of the dispersion number, `v` velocity and `D` largest
-///   dispersion, Δ_i sizes along the axes. Where flow is solved or read in cells Δ_i are those of the cells, `v` is
-///   an estimate of the mean speed along each axis, and `n` is 8, as particles take sub-steps. Elsewhere Δ_i are
+///   dispersion, by exchange that of a typical place, Δ_i sizes along the axes. Where flow is solved or read in cells
+///   Δ_i are those of the cells, `v` is an estimate of the mean speed along each axis, and `n` is 8, as particles take sub-steps. Elsewhere Δ_i are
 ///   the smallest bins of averages and outputs, or a hundredth of the extent, and `n` is 1.
 /// - Range: any; `T` itself where nothing moves.
 /// - Source: definition of the criteria.
@@ -35,9 +35,9 @@ pub(super) fn of_masses(
     outputs: &[Output],
     transport: &Transport,
     auto: Auto,
-    duration: f64,
+    (duration, exchanged): (f64, f64),
 ) -> Chosen {
-    let (limit, n_cells) = longest(axes, outputs, transport, auto);
+    let (limit, n_cells) = longest(axes, outputs, transport, auto, exchanged);
     let sub_steps = Some(SubSteps { courant: auto.courant, dispersion: auto.dispersion });
     let step = whole(n_cells * limit, duration);
     Chosen { step: fitting(outputs, step, duration).unwrap_or(step), sub_steps }
@@ -47,13 +47,19 @@ pub(super) fn of_masses(
 pub(super) fn displacements(plan: &Plan) -> f64 {
     let Some(transport) = &plan.transport else { return 1.0 };
     let Some(SubSteps { courant, dispersion }) = transport.sub_steps else { return 1.0 };
-    let (limit, n_cells) = longest(&plan.axes, &plan.outputs, transport, Auto { courant, dispersion });
+    let (limit, n_cells) = longest(&plan.axes, &plan.outputs, transport, Auto { courant, dispersion }, 0.0);
     let expected = plan.time.step / limit;
     if n_cells > 1.0 && expected.is_finite() { expected.max(1.0) } else { 1.0 }
 }
 
 /// The longest time that the criteria allow at the mean speed, and how many of them make a step.
-fn longest(axes: &[Axis], outputs: &[Output], transport: &Transport, auto: Auto) -> (f64, f64) {
+fn longest(
+    axes: &[Axis],
+    outputs: &[Output],
+    transport: &Transport,
+    auto: Auto,
+    exchanged: f64,
+) -> (f64, f64) {
     let of_cells = |cells: &[usize]| {
         let width = |(axis, &cells): (&Axis, &usize)| (axis.high - axis.low) / cells as f64;
         axes.iter().zip(cells).map(width).collect()
@@ -83,7 +89,7 @@ fn longest(axes: &[Axis], outputs: &[Output], transport: &Transport, auto: Auto)
     for own in flows.iter().map(of_flow) {
         velocity.iter_mut().zip(own).for_each(|(largest, v): (&mut f64, f64)| *largest = largest.max(v));
     }
-    let spread = spread(axes, &transport.dispersion, speed);
+    let spread = spread(axes, &transport.dispersion, speed) + exchanged;
     (limit(&sizes, &velocity, &vec![spread; axes.len()], auto), n_cells)
 }
 

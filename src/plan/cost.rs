@@ -23,6 +23,8 @@ mod table {
     pub(super) const PARCEL: f64 = 40.0;
     pub(super) const PAIR: f64 = 2.5;
     pub(super) const PAIR_VALUE: f64 = 0.5;
+    /// Neighbours where each parcel has a kernel of its own: more of them are looked at.
+    pub(super) const OWN_KERNELS: f64 = 2.5;
     /// Relaxation of one stored value.
     pub(super) const MIX: f64 = 0.7;
     /// One reaction of a particle in closed form, with reading and writing it.
@@ -149,8 +151,14 @@ pub fn estimate(plan: &Plan, scales: Option<&TimeScales>) -> Cost {
 /// Numbers per particle beside its position and what it carries: of parcels that come and go, and of those that are
 /// sorted and weighed for an exchange.
 fn own_values(plan: &Plan, n_values: f64) -> f64 {
-    let of_exchange = 2.0 * plan.axes.len() as f64 + 3.0 * n_values + 4.0;
-    let exchanged = if plan.exchange.is_some() { of_exchange } else { 0.0 };
+    let d = plan.axes.len() as f64;
+    let of_exchange = 2.0 * d + 3.0 * n_values + 4.0;
+    let exchanged = match &plan.exchange {
+        None => 0.0,
+        Some(exchange) if exchange.spreading.is_none() => of_exchange,
+        // Half a metric and a share, as parcels lie and in the order of cells.
+        Some(_) => of_exchange + d * (d + 1.0) + 2.0,
+    };
     exchanged + f64::from(u8::from(plan.transport.is_some()))
 }
 
@@ -159,7 +167,8 @@ fn exchange_cost(plan: &Plan, n_values: f64) -> f64 {
     let Some(exchange) = &plan.exchange else { return 0.0 };
     let sizes = exchange.sizes(plan, plan.time.step);
     let sums = exchange.sums(sizes.share);
-    table::SORT + sums * (table::PARCEL + sizes.neighbours * (table::PAIR + table::PAIR_VALUE * n_values))
+    let looked_at = if exchange.spreading.is_some() { table::OWN_KERNELS } else { 1.0 } * sizes.neighbours;
+    table::SORT + sums * (table::PARCEL + looked_at * (table::PAIR + table::PAIR_VALUE * n_values))
 }
 
 /// Nanoseconds per particle and step of a walk along tracks.

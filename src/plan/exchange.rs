@@ -6,6 +6,7 @@ use super::Plan;
 use super::check::{check_operations, require};
 use super::tape::Tape;
 use super::tape::dual::differentiate;
+use super::transport::Dispersion;
 use crate::catalog::kernel::{self, Item};
 use crate::maths::quadrature::integrate;
 use crate::maths::scalar::{exp, pow};
@@ -21,7 +22,11 @@ pub struct Exchange {
     /// Bandwidth h, m, over the inputs `collocation` and `spacing`, m.
     pub bandwidth: Tape,
     /// Dispersion by exchange: lower triangle row by row over the active axes, m²/s. What walks is beside it.
+    /// Where it varies from place to place, that of a typical one, the same along all axes.
     pub diffusion: Vec<f64>,
+    /// The dispersion by exchange where it varies.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub spreading: Option<Dispersion>,
     pub cutoff: Cutoff,
     /// Whether what the cut-off takes from the dispersion is given back.
     pub is_compensated: bool,

@@ -5,8 +5,10 @@
 
 use super::cost::Cost;
 use super::exchange::{Exchange, Integration, Sizes};
+use super::explain_exchange::walks;
 use super::limits::{Limit, axis_name, round_down, short, short_up};
 use super::tape::Operation;
+use super::transport::Flow;
 use super::{Placement, Plan, Stage};
 use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{N109, N110, N206, N207};
@@ -14,9 +16,6 @@ use crate::maths::scalar::pow;
 use crate::scenario::Scenario;
 use crate::source::Span;
 
-/// Shares of a step beyond which no sum is taken: implicit and exponential steps need ever more of them.
-const MOST_IMPLICIT: f64 = 1e4;
-const MOST_EXPONENTIAL: f64 = 200.0;
 /// Rules of so many mean distances are rules of thumb: what a cut-off takes from a kernel is no reason to warn.
 const SLACK: f64 = 0.05;
 /// What rounding may add to a share of one.
@@ -74,7 +73,9 @@ fn step(plan: &Plan) -> f64 {
 /// - Source: methods, sections 6.7 and 6.9.
 /// - Shape: one number.
 pub(super) fn least_bandwidths(plan: &Plan) -> f64 {
-    let rests = plan.walk.spread.iter().all(|entry| *entry == 0.0);
+    let is_sheared =
+        plan.transport.as_ref().is_some_and(|transport| !matches!(transport.flow, Flow::Uniform(_)));
+    let rests = !walks(plan) && !is_sheared;
     match plan.particles.placement {
         Placement::Ordered if rests && plan.particles.disorder == 0.0 => 1.0,
         Placement::Random if rests && plan.axes.len() == 1 => 3.0,
@@ -124,16 +125,8 @@ impl Sized<'_> {
             .help("write a length that fits the parcels, such as `bandwidth 1.5 * spacing`")
     }
 
-    fn most(&self) -> f64 {
-        match self.exchange.integration {
-            Integration::Explicit => 1.0,
-            Integration::Implicit => MOST_IMPLICIT,
-            Integration::Exponential => MOST_EXPONENTIAL,
-        }
-    }
-
     fn too_large_share(&self) -> Option<Diagnostic> {
-        let (sizes, most, step) = (&self.sizes, self.most(), step(self.plan));
+        let (sizes, most, step) = (&self.sizes, self.exchange.integration.most(), step(self.plan));
         if sizes.share <= most * (1.0 + ROUNDING) {
             return None;
         }

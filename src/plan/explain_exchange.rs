@@ -4,6 +4,7 @@
 
 use super::exchange::{Exchange, Integration, Kernel, Sizes, lattice_error, plume_error};
 use super::limits::short;
+use super::transport::Dispersion;
 use super::{Placement, Plan};
 use crate::catalog::kernel;
 use crate::diagnostic::number;
@@ -43,6 +44,7 @@ pub(super) fn lines(plan: &Plan) -> Vec<String> {
         ),
         dispersion_line(plan, exchange),
     ];
+    lines.extend(place_line(exchange, &sizes));
     lines.extend(cutoff_line(exchange, &sizes));
     lines.push(error_line(plan, exchange.integration, &sizes));
     let is_gaussian = matches!(&exchange.kernel, Kernel::Catalogue(name) if name == "gaussian");
@@ -71,9 +73,40 @@ fn kernel_line(exchange: &Exchange, sizes: &Sizes) -> String {
 
 fn dispersion_line(plan: &Plan, exchange: &Exchange) -> String {
     let exchanged: Vec<String> = exchange.diffusion.iter().map(|entry| number(*entry)).collect();
-    let walks = plan.walk.spread.iter().any(|entry| *entry != 0.0);
-    let rest = if walks { "the rest walks" } else { "nothing walks" };
-    format!("dispersion by exchange: lower triangle ({}) m^2/s; {rest}", exchanged.join(", "))
+    let rest = if walks(plan) { "the rest walks" } else { "nothing walks" };
+    let what = match &exchange.spreading {
+        None => format!("lower triangle ({}) m^2/s", exchanged.join(", ")),
+        Some(Dispersion::Velocity { longitudinal, transverse, molecular, .. }) => format!(
+            "longitudinal {} m, transverse {} m, molecular {} m^2/s",
+            number(*longitudinal),
+            number(*transverse),
+            number(*molecular)
+        ),
+        Some(_) => "an expression of the place".to_owned(),
+    };
+    format!("dispersion by exchange: {what}; {rest}")
+}
+
+/// What the sizes are of where dispersion varies.
+fn place_line(exchange: &Exchange, sizes: &Sizes) -> Option<String> {
+    exchange.spreading.as_ref()?;
+    Some(format!(
+        "each parcel has its own kernel, in the metric of the dispersion where it is; the numbers above and below are those of a \
+         typical place, D = {} m^2/s",
+        short(sizes.diffusion)
+    ))
+}
+
+/// Whether any of the dispersion walks.
+pub(super) fn walks(plan: &Plan) -> bool {
+    match plan.transport.as_ref().map(|transport| &transport.dispersion) {
+        None => plan.walk.spread.iter().any(|entry| *entry != 0.0),
+        Some(Dispersion::Constant(triangle)) => triangle.iter().any(|entry| *entry != 0.0),
+        Some(Dispersion::Isotropic(_)) => true,
+        Some(Dispersion::Velocity { longitudinal, transverse, transverse_vertical, molecular }) => {
+            [longitudinal, transverse, transverse_vertical, molecular].into_iter().any(|part| *part != 0.0)
+        }
+    }
 }
 
 /// What the end of the kernel takes.

@@ -32,9 +32,9 @@ pub fn lower(scenario: &Scenario) -> Result<Lowered, Vec<Diagnostic>> {
     let axes: Vec<Axis> =
         scenario.domain.axes.iter().zip(bins).map(|(axis, bins)| lower_axis(axis, bins)).collect();
     let decay = lower_decay::decay(scenario)?;
-    let exchange = lower_exchange::exchange(scenario)?;
     let network = lower_chemistry::network(scenario, &axes)?;
     let (transport, told) = lower_transport::transport(scenario, &axes, &network, decay)?;
+    let exchange = lower_exchange::exchange(scenario, &axes, transport.as_ref())?;
     let Network { species, components, chemistry, mut warnings, .. } = network;
     warnings.extend(told);
     let extent: f64 = axes.iter().map(|axis| axis.high - axis.low).product();
@@ -127,8 +127,11 @@ fn only_tracks(plan: &mut Plan) {
 /// `step auto`: a step by the criteria, which the particles of a flow in cells divide further.
 fn choose_step(scenario: &Scenario, plan: &mut Plan, auto: Auto) -> Result<(), Vec<Diagnostic>> {
     let duration = scenario.run.duration;
+    let exchanged = plan.exchange.as_ref().map_or(0.0, |exchange| exchange.mean_diffusion(plan.axes.len()));
     let chosen = match &plan.transport {
-        Some(transport) => auto_step::of_masses(&plan.axes, &plan.outputs, transport, auto, duration),
+        Some(transport) => {
+            auto_step::of_masses(&plan.axes, &plan.outputs, transport, auto, (duration, exchanged))
+        }
         None => auto_step::of_fluid(plan, auto, duration),
     };
     let n_steps = duration / chosen.step;

@@ -6,10 +6,13 @@
 use super::build_tape::build_tape;
 use super::exchange::{Exchange, Kernel, determinant, of_tape};
 use super::lower::too_large;
-use super::lower_transport::of_fluid;
+use super::lower_transport::{self, of_fluid};
 use super::tape::Tape;
+use super::transport::{Dispersion, Flow, Transport};
+use super::{Axis, shares};
 use crate::diagnostic::codes::{M005, M036, M037};
 use crate::diagnostic::{Diagnostic, precise};
+use crate::maths::scalar::pow;
 use crate::scenario::exchange::{Choice, Kernel as Written};
 use crate::scenario::{self, Scenario};
 
@@ -23,7 +26,11 @@ const NEAR: [f64; 3] = [1e-2, 1e-4, 1e-6];
 const FLAT: f64 = 1.5;
 
 /// The exchange of a scene; kernels that nobody uses are looked at as well.
-pub(super) fn exchange(scenario: &Scenario) -> Result<Option<Exchange>, Vec<Diagnostic>> {
+pub(super) fn exchange(
+    scenario: &Scenario,
+    axes: &[Axis],
+    transport: Option<&Transport>,
+) -> Result<Option<Exchange>, Vec<Diagnostic>> {
     let mut problems = Vec::new();
     let mut profiles = Vec::new();
     for kernel in &scenario.kernels {
@@ -50,10 +57,19 @@ pub(super) fn exchange(scenario: &Scenario) -> Result<Option<Exchange>, Vec<Diag
             support: scenario.kernels[idx].support.value,
         },
     };
+    let (diffusion, spreading) = match transport.map(|transport| varying(scenario, axes, transport, written))
+    {
+        Some(Some(spreading)) => {
+            let spreading = spreading?;
+            (typical(scenario, axes, transport, &spreading, written)?, Some(spreading))
+        }
+        _ => (diffusion(scenario, written)?, None),
+    };
     Ok(Some(Exchange {
         kernel,
         bandwidth,
-        diffusion: diffusion(scenario, written)?,
+        diffusion,
+        spreading,
         cutoff: written.cutoff,
         is_compensated: written.is_compensated,
         normalisation: written.normalisation,
@@ -64,6 +80,70 @@ pub(super) fn exchange(scenario: &Scenario) -> Result<Option<Exchange>, Vec<Diag
 /// The part of the dispersion that walks.
 pub(super) fn walking_part(scenario: &Scenario) -> f64 {
     scenario.exchange.as_ref().map_or(1.0, |exchange| 1.0 - exchange.mixing_fraction)
+}
+
+/// The part of a dispersion that is exchanged, where it varies from place to place.
+fn varying(
+    scenario: &Scenario,
+    axes: &[Axis],
+    transport: &Transport,
+    written: &scenario::exchange::Exchange,
+) -> Option<Result<Dispersion, Vec<Diagnostic>>> {
+    let full = match lower_transport::dispersion(scenario, axes) {
+        Ok(full) => full,
+        Err(problems) => return Some(Err(problems)),
+    };
+    let varies = match &full {
+        Dispersion::Constant(_) => false,
+        Dispersion::Isotropic(_) => true,
+        Dispersion::Velocity { longitudinal, transverse, transverse_vertical, .. } => {
+            let follows =
+                [longitudinal, transverse, transverse_vertical].into_iter().any(|length| *length != 0.0);
+            follows && !(matches!(transport.flow, Flow::Uniform(_)) && transport.changes.is_empty())
+        }
+    };
+    varies.then(|| Ok(full.times(written.mixing_fraction, axes.len())))
+}
+
+/// A dispersion that varies at a typical place: lower triangle, the same along all axes, m²/s.
+///
+/// - Equation: the mean of an expression; `(D_L D_T^{d−1})^{1/d}` at the mean speed.
+/// - Symbols: `D_L`, `D_T` dispersion along the flow and across it.
+/// - Range: an estimate, for sizes that are shown and checked before a flow is known.
+/// - Source: the metric of the exchange; methods, section 6.4.
+/// - Shape: `d (d + 1)/2` entries.
+fn typical(
+    scenario: &Scenario,
+    axes: &[Axis],
+    transport: Option<&Transport>,
+    spreading: &Dispersion,
+    written: &scenario::exchange::Exchange,
+) -> Result<Vec<f64>, Vec<Diagnostic>> {
+    let d = axes.len();
+    let size = match spreading {
+        Dispersion::Isotropic(tape) => shares::mean(tape, axes),
+        Dispersion::Velocity { longitudinal, transverse, transverse_vertical, molecular } => {
+            let speed = transport.map_or(0.0, |transport| shares::speed(axes, transport));
+            let lengths = [longitudinal, transverse, transverse_vertical];
+            let all = lengths.iter().take(d).map(|length| **length * speed + molecular);
+            all.map(|own| pow(own, 1.0 / d as f64)).product()
+        }
+        Dispersion::Constant(_) => 0.0,
+    };
+    if size > 0.0 && size.is_finite() {
+        return Ok((0..d).flat_map(|i| (0..=i).map(move |j| if i == j { size } else { 0.0 })).collect());
+    }
+    let place = scenario.dispersion.as_ref().map_or(written.span, |dispersion| dispersion.span);
+    Err(vec![
+        Diagnostic::refused(M036, "parcels of water cannot exchange in this scene")
+            .at(place, "no dispersion along some direction")
+            .also(written.span, "the exchange")
+            .found(format!("{} m^2/s at a typical place", precise(size)))
+            .expected("dispersion along all axes, of a size that numbers can hold")
+            .help(
+                "give every direction dispersion, molecular diffusion for example, or leave `exchange` out",
+            ),
+    ])
 }
 
 /// The part that is exchanged: lower triangle over the axes of the domain, m²/s.

@@ -8,6 +8,7 @@ use super::build_tape::build_tape;
 use super::burnett_frind::uniform_tensor;
 use super::lower::too_large;
 use super::lower_chemistry::Network;
+use super::lower_exchange::walking_part;
 use super::periods::{Periods, TimedSide};
 use super::shares;
 use super::tape::{Binary, Operation, Tape};
@@ -65,6 +66,15 @@ fn is_plain(scenario: &Scenario) -> bool {
         && scenario.domain.axes.iter().flat_map(|axis| axis.patches.iter().flatten()).all(is_bare)
 }
 
+/// The dispersion of a scene over the axes of its domain.
+pub(super) fn dispersion(scenario: &Scenario, axes: &[Axis]) -> Result<Dispersion, Vec<Diagnostic>> {
+    let mut lowering = Lowering { scenario, axes, totals: None, problems: Vec::new() };
+    match lowering.dispersion() {
+        Some((dispersion, _)) => Ok(dispersion),
+        None => Err(lowering.problems),
+    }
+}
+
 /// `value` everywhere.
 pub(super) fn constant(value: f64) -> Tape {
     Tape { operations: vec![Operation::Constant(value)] }
@@ -85,6 +95,8 @@ impl Lowering<'_> {
     fn transport(&mut self, decay: Option<Decay>) -> Option<Transport> {
         let (flow, changes) = self.flow()?;
         let (dispersion, own) = self.dispersion()?;
+        // What is exchanged does not walk.
+        let dispersion = dispersion.times(walking_part(self.scenario), self.axes.len());
         let porosity = match &self.scenario.medium {
             Some(porosity) => self.tape(&porosity.value, porosity.span)?,
             None => constant(1.0),

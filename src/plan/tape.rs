@@ -34,6 +34,15 @@ pub enum Operation {
     Table(Lookup),
 }
 
+impl Tape {
+    /// The same times a factor.
+    pub fn scale(&mut self, factor: f64) {
+        let result = (self.operations.len() - 1) as Register;
+        self.operations.push(Operation::Constant(factor));
+        self.operations.push(Operation::Binary(Binary::Multiply, result, result + 1));
+    }
+}
+
 /// A table of numbers at up to three coordinates; registers beyond those of the table count for nothing.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -255,6 +255,28 @@ pub enum Dispersion {
     Velocity { longitudinal: f64, transverse: f64, transverse_vertical: f64, molecular: f64 },
 }
 
+impl Dispersion {
+    /// A multiple of it, over `d` axes.
+    pub fn times(self, factor: f64, d: usize) -> Self {
+        match self {
+            same if factor == 1.0 => same,
+            Self::Constant(triangle) => Self::Constant(triangle.iter().map(|entry| factor * entry).collect()),
+            // Nothing is the same everywhere.
+            Self::Isotropic(_) if factor == 0.0 => Self::Constant(vec![0.0; d * (d + 1) / 2]),
+            Self::Isotropic(mut tape) => {
+                tape.scale(factor);
+                Self::Isotropic(tape)
+            }
+            Self::Velocity { longitudinal, transverse, transverse_vertical, molecular } => Self::Velocity {
+                longitudinal: factor * longitudinal,
+                transverse: factor * transverse,
+                transverse_vertical: factor * transverse_vertical,
+                molecular: factor * molecular,
+            },
+        }
+    }
+}
+
 /// A part of a side.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -163,6 +163,16 @@ impl Integration {
     pub fn word(self) -> &'static str {
         word(INTEGRATIONS, self)
     }
+
+    /// Share of a parcel that a step may exchange: above one an explicit step overshoots, and the others need ever
+    /// more sums.
+    pub fn most(self) -> f64 {
+        match self {
+            Self::Explicit => 1.0,
+            Self::Implicit => 1e4,
+            Self::Exponential => 200.0,
+        }
+    }
 }
 
 /// A place that is watched.

@@ -5,7 +5,7 @@
 
 use super::Scenario;
 use super::check::Checker;
-use super::transport::{Dispersion, Flow, SideRule};
+use super::transport::SideRule;
 use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::M036;
 use crate::source::Span;
@@ -25,7 +25,7 @@ pub(super) fn check(checker: &mut Checker<'_>, scenario: &Scenario) {
         checker.report(
             message
                 .found(found)
-                .expected("parcels in uniform flow, constant dispersion, and sides that reflect, are periodic or open")
+                .expected("parcels of water, dispersion, and sides that take nothing from parcels")
                 .help(help),
         );
     }
@@ -40,35 +40,24 @@ fn against(scenario: &Scenario) -> Vec<Against> {
             "write `particles fluid` and a number, or leave `exchange` out",
         ));
     }
-    if let Some(flow) = scenario.flow.as_ref().filter(|flow| !matches!(flow.value, Flow::Uniform(_))) {
-        list.push(("a flow that varies", Some(flow.span), "use `flow uniform`"));
-    }
-    match scenario.dispersion.as_ref().map(|dispersion| (&dispersion.value, dispersion.span)) {
-        None => list.push((
+    if scenario.dispersion.is_none() {
+        list.push((
             "no dispersion, which is what an exchange does",
             None,
             "add for example `dispersion 1e-9 m^2/s`",
-        )),
-        Some((Dispersion::Isotropic(_), span)) => list.push((
-            "dispersion that varies with the place",
-            Some(span),
-            "give the dispersion one value, or a tensor of constants",
-        )),
-        Some(_) => {}
+        ));
     }
-    if let Some(medium) = scenario.medium.as_ref().filter(|medium| medium.value.value().is_none()) {
-        list.push(("porosity that varies with the place", Some(medium.span), "give the porosity one value"));
-    }
-    if let Some(span) = side_with_a_rule(scenario) {
-        let help = "let the sides reflect, be periodic or open, each as a whole";
-        list.push(("a side that lets water in or out, or takes what it carries", Some(span), help));
+    if let Some(span) = side_that_takes(scenario) {
+        let help = "let the side reflect, be periodic or open, or let water in or out (`inflow`, `outflow`)";
+        list.push(("a side that takes or gives what parcels carry", Some(span), help));
     }
     list
 }
 
-/// The first side that is more than a wall, periodic or open.
-fn side_with_a_rule(scenario: &Scenario) -> Option<Span> {
+/// The first side that takes or gives what parcels carry without the parcels themselves: they touch it by walking, and
+/// what is exchanged does not walk.
+fn side_that_takes(scenario: &Scenario) -> Option<Span> {
     let patches = scenario.domain.axes.iter().flat_map(|axis| axis.patches.iter().flatten());
-    let is_simple = |rule: &SideRule| matches!(rule, SideRule::Reflect | SideRule::Periodic | SideRule::Open);
-    patches.into_iter().find(|patch| !patch.limits.is_empty() || !is_simple(&patch.rule)).map(|it| it.span)
+    let takes = |rule: &SideRule| matches!(rule, SideRule::Absorb | SideRule::Partial(_) | SideRule::Held(_));
+    patches.into_iter().find(|patch| takes(&patch.rule)).map(|it| it.span)
 }

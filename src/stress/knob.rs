@@ -5,7 +5,7 @@
 
 use crate::plan::Plan;
 use crate::plan::compile::before_passes;
-use crate::plan::tape::{Binary, Operation, Register, Tape};
+use crate::plan::tape::{Binary, Operation, Register};
 use crate::plan::transport::Transport;
 use crate::plan::{Time, ZoneRate, chemistry};
 use crate::scenario::Scenario;
@@ -90,9 +90,9 @@ impl Knob {
         match self {
             Self::Rates => multiply_rates(plan, factor),
             Self::Concentrations => {
-                plan.components.iter_mut().for_each(|component| multiply(&mut component.initial, factor));
+                plan.components.iter_mut().for_each(|component| component.initial.scale(factor));
                 let transport = plan.transport.iter_mut();
-                transport.flat_map(Transport::carried_mut).for_each(|tape| multiply(tape, factor));
+                transport.flat_map(Transport::carried_mut).for_each(|tape| tape.scale(factor));
                 if let Some(chemistry) = &mut plan.chemistry {
                     chemistry.floors.iter_mut().for_each(|floor| *floor *= factor);
                 }
@@ -127,7 +127,7 @@ impl Knob {
                 plan.time = Time::new(duration, (plan.time.step * factor).min(duration));
             }
             Self::Bandwidth => {
-                plan.exchange.iter_mut().for_each(|exchange| multiply(&mut exchange.bandwidth, factor));
+                plan.exchange.iter_mut().for_each(|exchange| exchange.bandwidth.scale(factor));
             }
         }
     }
@@ -139,15 +139,10 @@ fn exchanges(plan: &Plan) -> bool {
 }
 
 fn divide_exchange(plan: &mut Plan, factor: f64) {
-    let entries = plan.exchange.iter_mut().flat_map(|exchange| &mut exchange.diffusion);
-    entries.for_each(|entry| *entry /= factor);
-}
-
-fn multiply(tape: &mut Tape, factor: f64) {
-    let operations = &mut tape.operations;
-    let result = (operations.len() - 1) as Register;
-    operations.push(Operation::Constant(factor));
-    operations.push(Operation::Binary(Binary::Multiply, result, result + 1));
+    let n_axes = plan.axes.len();
+    let Some(exchange) = &mut plan.exchange else { return };
+    exchange.diffusion.iter_mut().for_each(|entry| *entry /= factor);
+    exchange.spreading = exchange.spreading.take().map(|spreading| spreading.times(1.0 / factor, n_axes));
 }
 
 fn multiply_rates(plan: &mut Plan, factor: f64) {

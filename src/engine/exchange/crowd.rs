@@ -91,12 +91,17 @@ impl Sorted {
 
     /// A column of all parcels, in the order of cells.
     pub fn gather<const D: usize>(&self, blocks: &[Block<D>], column: usize, target: &mut Vec<f64>) {
+        self.bring(&|block| &blocks[block].columns[column], target);
+    }
+
+    /// What each block has for its parcels, in the order of cells.
+    pub fn bring<'a>(&self, of_block: &(dyn Fn(usize) -> &'a [f64] + Sync), target: &mut Vec<f64>) {
         target.resize(self.places.len() + PADDING, 0.0);
         let mut parts: Vec<_> = self.places.chunks(BLOCK).zip(target.chunks_mut(BLOCK)).collect();
         parallel::for_each(&mut parts, &|_, (places, target)| {
             for (value, &place) in target.iter_mut().zip(*places) {
                 let (block, at) = split(place);
-                *value = blocks[block].columns[column][at];
+                *value = of_block(block)[at];
             }
         });
     }

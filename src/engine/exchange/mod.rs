@@ -3,20 +3,27 @@
 //! Owns one step of it. May use blocks, kernels and `parallel`. It deliberately moves nothing: places stay as they are.
 
 mod crowd;
+mod ellipse;
 mod in_run;
 mod integrate;
+mod local;
+mod matrix;
 mod near;
 mod operator;
 mod space;
 mod table;
 
+use super::control::Settings;
 use super::error::RunError;
 use super::parallel::Pool;
 use super::program::{Program, Role, unsound};
 use crate::maths::wide::Width;
 use crate::plan::exchange::{Exchange as Planned, Sizes};
+use crate::plan::transport::{Patch, SideRule};
+use crate::plan::{Axis, Plan, Side};
 use crate::state::particles::Block;
 use crowd::{MOST_BLOCKS, Sorted};
+use local::Local;
 use near::Near;
 use operator::{Operator, Profile};
 use space::Space;
@@ -26,10 +33,27 @@ pub struct Exchange<const D: usize> {
     planned: Planned,
     sizes: Sizes,
     space: Space<D>,
+    /// Where dispersion varies from place to place.
+    local: Option<Local<D>>,
     profile: Profile,
     sorted: Sorted,
     columns: Vec<Vec<f64>>,
     lists: Pool<Near>,
+}
+
+/// The axes of a plan with what sides are to an exchange: nothing disperses through those that water flows through.
+fn closed(plan: &Plan) -> Vec<Axis> {
+    let mut axes = plan.axes.clone();
+    let Some(transport) = &plan.transport else { return axes };
+    let of_side = |patches: &[Patch]| match patches.first().map(|patch| &patch.rule) {
+        Some(SideRule::Periodic) => Side::Periodic,
+        Some(SideRule::Open) => Side::Open,
+        _ => Side::Reflect,
+    };
+    for (axis, [low, high]) in axes.iter_mut().zip(&transport.sides) {
+        (axis.low_side, axis.high_side) = (of_side(low), of_side(high));
+    }
+    axes
 }
 
 /// A value that is wrong after an exchange.
@@ -40,14 +64,15 @@ pub struct Wrong {
 }
 
 impl<const D: usize> Exchange<D> {
-    pub fn new(program: &Program<D>) -> Result<Option<Self>, RunError> {
+    pub fn new(program: &Program<D>, settings: &Settings) -> Result<Option<Self>, RunError> {
         let plan = program.plan;
         let Some(planned) = &plan.exchange else { return Ok(None) };
         planned.check(D).map_err(|reason| unsound(&reason))?;
         let dt = plan.time.step.min(plan.time.duration);
         let sizes = planned.sizes(plan, dt);
         let size = (sizes.bandwidth, sizes.radius);
-        let space = Space::new(&plan.axes, &planned.diffusion, size, plan.particles.count)
+        let axes = closed(plan);
+        let space = Space::new(&axes, &planned.diffusion, size, plan.particles.count)
             .filter(|_| sizes.share.is_finite() && sizes.bandwidth > 0.0)
             .ok_or_else(|| unsound("an exchange without dispersion or bandwidth"))?;
         let profile =
@@ -56,6 +81,7 @@ impl<const D: usize> Exchange<D> {
             planned: planned.clone(),
             sizes,
             space,
+            local: Local::new(plan, planned, settings)?,
             profile,
             sorted: Sorted::default(),
             columns: Vec::new(),
@@ -69,6 +95,7 @@ impl<const D: usize> Exchange<D> {
             planned: self.planned.clone(),
             sizes: self.sizes,
             space: self.space.clone(),
+            local: self.local.as_ref().map(Local::copy),
             profile: self.profile.clone(),
             sorted: Sorted::default(),
             columns: Vec::new(),
@@ -95,14 +122,19 @@ impl<const D: usize> Exchange<D> {
         if carried.is_empty() {
             return Ok(None);
         }
+        self.look(program, blocks, (dt, width))?;
         self.sorted.sort(&self.space, blocks);
+        if let Some(local) = &mut self.local {
+            local.sort(&self.sorted);
+        }
         self.columns.resize_with(carried.len(), Vec::new);
         for (values, &column) in self.columns.iter_mut().zip(&carried) {
             self.sorted.gather(blocks, column, values);
         }
         let crowd = self.sorted.crowd(&self.space);
         let normalisation = self.planned.normalisation;
-        let mut operator = Operator::new(crowd, &self.profile, normalisation, width, &self.lists);
+        let around = (crowd, self.local.as_ref().and_then(Local::metrics));
+        let mut operator = Operator::new(around, &self.profile, normalisation, width, &self.lists);
         let beta = self.beta(dt);
         integrate::step(&mut operator, self.planned.integration, beta, &mut self.columns);
         let mut wrong = None;
@@ -115,8 +147,26 @@ impl<const D: usize> Exchange<D> {
         Ok(wrong)
     }
 
-    /// What the normalised sum of exchange forces is multiplied by in `dt`.
+    /// Kernels and cells for where parcels are, if they differ from place to place.
+    fn look(
+        &mut self,
+        program: &Program<D>,
+        blocks: &[Block<D>],
+        (dt, width): (f64, Width),
+    ) -> Result<(), RunError> {
+        let Some(local) = &mut self.local else { return Ok(()) };
+        let (plan, radius) = (program.plan, self.sizes.radius);
+        let step = plan.time.step.min(plan.time.duration);
+        let reach = local.look(blocks, (step, dt), (radius, width))?;
+        self.space = Space::plain(&closed(plan), radius, reach, plan.particles.count);
+        Ok(())
+    }
+
+    /// What the normalised sum of exchange forces is multiplied by in `dt`; where kernels differ it is in the weights.
     fn beta(&self, dt: f64) -> f64 {
+        if self.local.is_some() {
+            return 1.0;
+        }
         let Sizes { diffusion, bandwidth, fidelity, .. } = self.sizes;
         let given_back = if self.planned.is_compensated { 1.0 / fidelity } else { 1.0 };
         2.0 * diffusion * dt / (bandwidth * bandwidth) * given_back

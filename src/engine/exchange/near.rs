@@ -12,7 +12,7 @@ use crate::catalog::kernel::Radial;
 const LANES: usize = 8;
 
 /// Numbers that are read or written together: rows are taken in whole pieces, beyond their ends.
-const PIECE: usize = 4;
+pub(super) const PIECE: usize = 4;
 
 /// What every array of a crowd is longer than it, so that whole pieces can be read.
 pub const PADDING: usize = PIECE;
@@ -31,12 +31,12 @@ pub struct Crowd<'a, const D: usize> {
 /// Squared distances of what is near, later weights, row by row of cells.
 #[derive(Debug, Default)]
 pub struct Near {
-    weights: Vec<f64>,
+    pub(super) weights: Vec<f64>,
     /// Something else of the same parcels.
     others: Vec<f64>,
     /// Where a row stands among all parcels, and how many it has.
-    rows: Vec<(usize, usize)>,
-    n: usize,
+    pub(super) rows: Vec<(usize, usize)>,
+    pub(super) n: usize,
     /// `n`, and what is missing in the last lanes.
     end: usize,
     /// Where the parcel itself stands.
@@ -54,6 +54,19 @@ impl Near {
             y[axis] = crowd.y[axis][idx];
         }
         self.look(crowd, y);
+        self.find_own(idx);
+        for image in crowd.space.images(y) {
+            let y = image.of(y);
+            if crowd.space.is_near(y) {
+                self.look(crowd, y);
+            }
+        }
+        self.close();
+    }
+
+    /// Where parcel `idx` itself stands in its rows.
+    #[inline(always)]
+    pub(super) fn find_own(&mut self, idx: usize) {
         let mut at = 0;
         for row in 0..self.rows.len() {
             let (start, n) = self.rows[row];
@@ -62,13 +75,11 @@ impl Near {
             }
             at += n;
         }
-        for image in crowd.space.images(y) {
-            let y = image.of(y);
-            if crowd.space.is_near(y) {
-                self.look(crowd, y);
-            }
-        }
-        // The rest of the last lanes is out of reach.
+    }
+
+    /// The rest of the last lanes is out of reach.
+    #[inline(always)]
+    pub(super) fn close(&mut self) {
         self.end = self.n.next_multiple_of(LANES);
         self.make_room(0);
         self.weights[self.n..self.end].fill(f64::MAX);
@@ -138,7 +149,7 @@ impl Near {
 
     /// Room for `n` more, whole pieces and lanes.
     #[inline(always)]
-    fn make_room(&mut self, n: usize) {
+    pub(super) fn make_room(&mut self, n: usize) {
         if self.weights.len() < self.n + n + LANES {
             self.grow(n);
         }
@@ -196,6 +207,20 @@ impl Near {
         let (weights, others) = (&mut self.weights[..self.end], &self.others[..self.end]);
         for idx in 0..weights.len() {
             weights[idx] *= 2.0 / (own + others[idx]);
+        }
+    }
+
+    /// `w_ij ← 2 w_ij b_ij / (ρ_i + ρ_j)`, `b_ij = 2 b_i b_j/(b_i + b_j)`.
+    #[inline(always)]
+    pub fn share_by_mean(&mut self, densities: &[f64], own: f64, shares: &[f64], share: f64) {
+        self.divide_by_mean(densities, own);
+        self.fetch(shares);
+        let (weights, others) = (&mut self.weights[..self.end], &self.others[..self.end]);
+        for idx in 0..weights.len() {
+            let sum = share + others[idx];
+            // Two that exchange nothing.
+            let mean = 2.0 * share * others[idx] / if sum > 0.0 { sum } else { 1.0 };
+            weights[idx] *= mean;
         }
     }
 

@@ -5,6 +5,7 @@
 #![allow(clippy::needless_range_loop)] // Zipped iterators are not always inlined; these loops are hot.
 
 use super::super::parallel::{self, Pool};
+use super::local::Metrics;
 use super::near::{Crowd, Near, PADDING};
 use super::table::Tabulated;
 use crate::catalog::kernel::{
@@ -54,6 +55,8 @@ impl Profile {
 /// Everything that the weights of one set of positions are made of.
 pub struct Operator<'a, const D: usize> {
     pub crowd: Crowd<'a, D>,
+    /// Where kernels differ from parcel to parcel: shares are then in the weights.
+    pub metrics: Option<Metrics<'a>>,
     pub profile: &'a Profile,
     pub normalisation: Normalisation,
     pub width: Width,
@@ -84,14 +87,22 @@ impl<'a, const D: usize> Operator<'a, D> {
     /// - Source: methods, section 6.3; R. Sinkhorn, P. Knopp 1967, doi:10.2140/pjm.1967.21.343.
     /// - Shape: one factor per parcel.
     pub fn new(
-        crowd: Crowd<'a, D>,
+        (crowd, metrics): (Crowd<'a, D>, Option<Metrics<'a>>),
         profile: &'a Profile,
         normalisation: Normalisation,
         width: Width,
         lists: &'a Pool<Near>,
     ) -> Self {
-        let mut own =
-            Self { crowd, profile, normalisation, width, lists, factors: Vec::new(), caps: Vec::new() };
+        let mut own = Self {
+            crowd,
+            metrics,
+            profile,
+            normalisation,
+            width,
+            lists,
+            factors: Vec::new(),
+            caps: Vec::new(),
+        };
         let mut densities = vec![0.0; crowd.n + PADDING];
         own.pass(Wanted::Densities, &mut [&mut densities]);
         match normalisation {
@@ -101,6 +112,10 @@ impl<'a, const D: usize> Operator<'a, D> {
                 densities.iter_mut().for_each(|value| *value = 1.0 / value.sqrt());
                 own.balance(&mut densities);
             }
+        }
+        if let Some(metrics) = metrics.filter(|_| normalisation != Normalisation::Arithmetic) {
+            // The geometric mean of two shares is the product of their roots.
+            densities.iter_mut().zip(metrics.shares).for_each(|(factor, share)| *factor *= share.sqrt());
         }
         own.factors = densities;
         own
@@ -179,7 +194,10 @@ impl<const D: usize, K: Radial> pulp::NullaryFnOnce for OnPortion<'_, '_, D, K> 
         let square = operator.crowd.space.radius * operator.crowd.space.radius;
         for at in 0..n {
             let idx = first + at;
-            near.find(&operator.crowd, idx);
+            match &operator.metrics {
+                None => near.find(&operator.crowd, idx),
+                Some(metrics) => near.find_within(&operator.crowd, metrics, idx),
+            }
             match wanted {
                 Wanted::Densities => {
                     near.weigh(kernel, square);
@@ -209,9 +227,12 @@ impl<const D: usize> Operator<'_, D> {
     #[inline(always)]
     fn normalise(&self, near: &mut Near, idx: usize) {
         let own = self.factors[idx];
-        match self.normalisation {
-            Normalisation::Arithmetic => near.divide_by_mean(&self.factors, own),
-            Normalisation::Geometric | Normalisation::Sinkhorn => near.multiply(&self.factors, own),
+        match (self.normalisation, &self.metrics) {
+            (Normalisation::Arithmetic, None) => near.divide_by_mean(&self.factors, own),
+            (Normalisation::Arithmetic, Some(metrics)) => {
+                near.share_by_mean(&self.factors, own, metrics.shares, metrics.shares[idx]);
+            }
+            (Normalisation::Geometric | Normalisation::Sinkhorn, _) => near.multiply(&self.factors, own),
         }
         if !self.caps.is_empty() {
             near.limit(&self.caps, self.caps[idx]);

@@ -76,9 +76,56 @@ impl<const D: usize> Space<D> {
             images: Vec::new(),
         };
         space.enclose(axes);
-        space.divide(n_particles);
+        space.divide(n_particles, [radius; D]);
         space.images = space.images_of(axes);
         Some(space)
+    }
+
+    /// The space of the scene itself, with cells for kernels of a mean reach along each axis, m, that end at a radius.
+    pub fn plain(axes: &[Axis], radius: f64, reach: [f64; D], n_particles: u64) -> Self {
+        let (low, high) = (|axis: usize| axes[axis].low, |axis: usize| axes[axis].high);
+        let mut rows = [[0.0; D]; D];
+        (0..D).for_each(|axis| rows[axis][axis] = 1.0);
+        let mut space = Self {
+            rows,
+            radius,
+            low: std::array::from_fn(low),
+            high: std::array::from_fn(high),
+            inverse_edge: [1.0; D],
+            edge: [1.0; D],
+            cells: [1; D],
+            last: [0.0; D],
+            // Images of the nearest sides are enough: no distance is asked of them.
+            reach: 0.0,
+            reach_square: 0.0,
+            slack: 0.0,
+            images: Vec::new(),
+        };
+        // A cell is no smaller than the last bits of a place.
+        let least = |axis: usize| 1e-9 * (high(axis) - low(axis));
+        space.divide(n_particles, std::array::from_fn(|axis| reach[axis].max(least(axis))));
+        space.radius = 0.0;
+        space.images = space.images_of(axes);
+        space.radius = radius;
+        space
+    }
+
+    /// The extent of an axis of the box.
+    pub fn bounds(&self, axis: usize) -> (f64, f64) {
+        (self.low[axis], self.high[axis])
+    }
+
+    pub fn all_images(&self) -> &[Image<D>] {
+        &self.images
+    }
+
+    /// Where a cell along an axis begins and ends; the outer ones have no end.
+    #[inline(always)]
+    pub fn strip(&self, axis: usize, cell: usize) -> (f64, f64) {
+        let begin = self.low[axis] + self.edge[axis] * cell as f64;
+        let low = if cell == 0 { f64::NEG_INFINITY } else { begin };
+        let high = if cell + 1 == self.cells[axis] { f64::INFINITY } else { begin + self.edge[axis] };
+        (low, high)
     }
 
     pub fn of(&self, x: [f64; D]) -> [f64; D] {
@@ -106,10 +153,10 @@ impl<const D: usize> Space<D> {
     }
 
     /// Cells of a part of the radius, not many more than particles.
-    fn divide(&mut self, n_particles: u64) {
+    fn divide(&mut self, n_particles: u64, reach: [f64; D]) {
         let most = (2 * n_particles.clamp(512, 1 << 30)) as f64;
         let mut edge: [f64; D] =
-            std::array::from_fn(|axis| self.radius / if axis + 1 == D { ALONG } else { ACROSS });
+            std::array::from_fn(|axis| reach[axis] / if axis + 1 == D { ALONG } else { ACROSS });
         let lengths: [f64; D] = std::array::from_fn(|axis| self.high[axis] - self.low[axis]);
         for _ in 0..64 {
             let n: f64 = (0..D).map(|axis| (lengths[axis] / edge[axis]).ceil().max(1.0)).product();
