@@ -22,6 +22,7 @@ pub fn gaussian(diffusion: Vec<f64>, bandwidth: Tape) -> Exchange {
         kernel: Kernel::Catalogue("gaussian".to_owned()),
         bandwidth,
         diffusion,
+        spreading: None,
         cutoff: Cutoff::Radius(6.0),
         is_compensated: true,
         normalisation: Normalisation::Arithmetic,
