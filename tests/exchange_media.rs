@@ -175,8 +175,8 @@ output particles A at t = 200 s
     }
 }
 
-/// One step of the exchange between all pairs and their images, as it is defined: `½ (H_i⁻¹ + H_j⁻¹)`, the harmonic mean of
-/// shares, the mean of densities.
+/// One step of the exchange between all pairs and their images, as it is defined: `½ (H_i⁻¹ + H_j⁻¹)` where both kernels
+/// reach, the harmonic mean of shares, the mean of densities.
 fn written_out(
     (places, values): (&[Vec<f64>], &[f64]),
     tensor: &dyn Fn(f64, f64) -> [f64; 3],
@@ -202,13 +202,11 @@ fn written_out(
                 let sign = if flip { -1.0 } else { 1.0 };
                 let dx = places[0][j] + f64::from(k) * extent[0] - places[0][i];
                 let dy = sign * places[1][j] + 2.0 * f64::from(m) * extent[1] - places[1][i];
-                let [a, b, c] = [0, 1, 2].map(|e| {
-                    let flipped = if e == 1 { sign } else { 1.0 };
-                    0.5 * (own[i].0[e] + flipped * own[j].0[e])
-                });
-                let square = a * dx * dx + 2.0 * b * dx * dy + c * dy * dy;
-                if square < radius * radius {
-                    w[i][j] += (-0.5 * square).exp();
+                let square = |[a, b, c]: [f64; 3]| a * dx * dx + 2.0 * b * dx * dy + c * dy * dy;
+                let [a, b, c] = own[j].0;
+                let (one, other) = (square(own[i].0), square([a, sign * b, c]));
+                if one.max(other) < radius * radius {
+                    w[i][j] += (-0.25 * (one + other)).exp();
                 }
             }
         }

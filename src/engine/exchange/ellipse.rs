@@ -12,30 +12,26 @@ use super::near::{Crowd, Near, PIECE};
 /// Added to extents, relative: rounding must not cut off what is just within them.
 const SLACK: f64 = 1e-9;
 
-/// Everything that a kernel may reach: `rᵀ Q r < a²`.
+/// Everything that the kernel of a parcel reaches: `rᵀ Q r < a²/2`.
 struct Ellipse<const D: usize> {
-    /// Lower triangle of `Q` and of its inverse.
+    /// Lower triangle of `Q`, half of a metric, and of its inverse.
     form: Triangle,
     inverse: Triangle,
-    /// a², and half the extent along each axis.
+    /// a²/2, and half the extent along each axis.
     square: f64,
     half: [f64; D],
 }
 
 impl<const D: usize> Ellipse<D> {
-    /// What parcel `i` may reach: `H_j⁻¹` is nowhere below `least`.
     #[inline(always)]
-    fn new(own: &Triangle, least: f64, radius: f64) -> Self {
-        let mut form = *own;
-        for axis in 0..D {
-            form[axis * (axis + 1) / 2 + axis] += least;
-        }
-        let inverse = inverse::<D>(&form, determinant::<D>(&form));
+    fn new(form: &Triangle, radius: f64) -> Self {
+        let inverse = inverse::<D>(form, determinant::<D>(form));
+        let square = 0.5 * radius * radius * (1.0 + SLACK);
         let mut half = [0.0; D];
         for axis in 0..D {
-            half[axis] = radius * inverse[axis * (axis + 1) / 2 + axis].sqrt() * (1.0 + SLACK);
+            half[axis] = (square * inverse[axis * (axis + 1) / 2 + axis]).sqrt() * (1.0 + SLACK);
         }
-        Self { form, inverse, square: radius * radius * (1.0 + SLACK), half }
+        Self { form: *form, inverse, square, half }
     }
 
     /// What of a strip of the first axis, as an offset, is within.
@@ -46,8 +42,8 @@ impl<const D: usize> Ellipse<D> {
 
     /// Extent along the second axis where the offset along the first lies in a strip.
     ///
-    /// - Equation: `v = m u ± √((a² − s u²)/q)`; `m = p₀₁/p₀₀`, `s = 1/p₀₀`, `q = p₀₀/(p₀₀ p₁₁ − p₀₁²)`.
-    /// - Symbols: `p` the inverse of `Q` over both axes, u and v offsets.
+    /// - Equation: `v = m u ± √((b − s u²)/q)`; `m = p₀₁/p₀₀`, `s = 1/p₀₀`, `q = p₀₀/(p₀₀ p₁₁ − p₀₁²)`.
+    /// - Symbols: `b` half the square of the radius, `p` the inverse of `Q` over both axes, u and v offsets.
     /// - Range: the largest v over a strip is at `u = p₀₁ v_max/p₁₁`, or at the end of the strip that is nearest.
     /// - Source: the shadow of an ellipsoid, by completing squares.
     /// - Shape: from, to.
@@ -85,39 +81,53 @@ impl<const D: usize> Ellipse<D> {
         (lowest - slack, highest + slack)
     }
 
-    /// Extent along the third axis above a rectangle of the others.
+    /// Extent along the third axis above a rectangle of the others; from above to where nothing is.
     ///
-    /// - Equation: `w = m·(u, v) ± √((a² − f)/q₂₂)`, `m = −(q₂₀, q₂₁)/q₂₂`, `f ≥ max(u²/p₀₀, v²/p₁₁)`.
-    /// - Symbols: `q` entries of `Q`, `p` of its inverse.
+    /// - Equation: `w = m·(u, v) ± √((b − f)/q₂₂)`, `m = −(q₂₀, q₂₁)/q₂₂`,
+    ///   `f = v²/p₁₁ + (u − v p₀₁/p₁₁)²/(p₀₀ − p₀₁²/p₁₁)`.
+    /// - Symbols: `q` entries of `Q`, `p` of its inverse, `f` the least over the rectangle, term by term.
     /// - Range: somewhat too far where an ellipse is oblique.
     /// - Source: as above.
     /// - Shape: from, to.
     #[inline(always)]
     fn above(&self, u: (f64, f64), v: (f64, f64)) -> (f64, f64) {
         let q22 = self.form[5];
-        let m = (-self.form[3] / q22, -self.form[4] / q22);
-        let ends =
-            |m: f64, (low, high): (f64, f64)| if m < 0.0 { (m * high, m * low) } else { (m * low, m * high) };
-        let (a, b) = (ends(m.0, u), ends(m.1, v));
-        let nearest = |(low, high): (f64, f64)| {
-            if low > 0.0 {
-                low
-            } else if high < 0.0 {
-                -high
-            } else {
-                0.0
-            }
-        };
-        let (du, dv) = (nearest(u), nearest(v));
-        let floor = (du * du / self.inverse[0]).max(dv * dv / self.inverse[2]);
-        let root = ((self.square - floor).max(0.0) / q22).sqrt();
+        let a = times(-self.form[3] / q22, u);
+        let b = times(-self.form[4] / q22, v);
+        let (p00, p01, p11) = (self.inverse[0], self.inverse[1], self.inverse[2]);
+        let leaned = times(-p01 / p11, v);
+        let (du, dv) = (nearest((u.0 + leaned.0, u.1 + leaned.1)), nearest(v));
+        let rest = self.square - dv * dv / p11 - du * du / (p00 - p01 * p01 / p11);
+        if rest < 0.0 {
+            return (1.0, -1.0);
+        }
+        let root = (rest / q22).sqrt();
         let (half, slack) = (self.half[D - 1], SLACK * self.half[D - 1]);
         ((a.0 + b.0 - root - slack).max(-half), (a.1 + b.1 + root + slack).min(half))
     }
 }
 
+/// A multiple of an interval.
+#[inline(always)]
+fn times(factor: f64, (low, high): (f64, f64)) -> (f64, f64) {
+    if factor < 0.0 { (factor * high, factor * low) } else { (factor * low, factor * high) }
+}
+
+/// What of an interval is nearest to zero, without its sign.
+#[inline(always)]
+fn nearest((low, high): (f64, f64)) -> f64 {
+    if low > 0.0 {
+        low
+    } else if high < 0.0 {
+        -high
+    } else {
+        0.0
+    }
+}
+
 impl Near {
-    /// Finds everything within reach of parcel `idx` in the mean metric of each pair, and somewhat more.
+    /// Finds everything that the kernel of parcel `idx` reaches, with distances in the mean metric of each pair, and somewhat
+    /// more, which is out of reach.
     #[inline(always)]
     pub fn find_within<const D: usize>(&mut self, crowd: &Crowd<D>, metrics: &Metrics, idx: usize) {
         self.rows.clear();
@@ -131,7 +141,7 @@ impl Near {
             own[entry] = metrics.halves[entry][idx];
         }
         let space = crowd.space;
-        let ellipse = Ellipse::<D>::new(&own, metrics.least, space.radius);
+        let ellipse = Ellipse::<D>::new(&own, space.radius);
         self.look_within(crowd, metrics, y, &own, &ellipse);
         self.find_own(idx);
         let mut is_inside = true;
@@ -155,7 +165,7 @@ impl Near {
                             own[row * (row + 1) / 2 + column] *= image.sign[row] * image.sign[column];
                         }
                     }
-                    let ellipse = Ellipse::<D>::new(&own, metrics.least, space.radius);
+                    let ellipse = Ellipse::<D>::new(&own, space.radius);
                     self.look_within(crowd, metrics, y, &own, &ellipse);
                 }
             }
@@ -203,7 +213,7 @@ impl Near {
         }
     }
 
-    /// Squared distances along one row: `rᵀ (½ H_i⁻¹ + ½ H_j⁻¹) r`.
+    /// Squared distances along one row: `rᵀ (½ H_i⁻¹ + ½ H_j⁻¹) r`, where both kernels reach.
     #[inline(always)]
     fn row_within<const D: usize>(
         &mut self,
@@ -233,27 +243,31 @@ impl Near {
         for entry in 0..D * (D + 1) / 2 {
             halves[entry] = metrics.halves[entry][start..start + whole].as_chunks::<PIECE>().0;
         }
+        let most = 0.5 * space.radius * space.radius;
         for piece in 0..target.len() {
-            let mut squares = [0.0; PIECE];
             let mut offsets = [[0.0; PIECE]; D];
             for axis in 0..D {
                 for k in 0..PIECE {
                     offsets[axis][k] = columns[axis][piece][k] - y[axis];
                 }
             }
+            let (mut of_own, mut of_other) = ([0.0; PIECE], [0.0; PIECE]);
             for axis in 0..D {
-                let mut sums = [0.0; PIECE];
-                for other in 0..axis {
+                for other in 0..=axis {
                     let entry = axis * (axis + 1) / 2 + other;
+                    let twice = if other == axis { 1.0 } else { 2.0 };
                     for k in 0..PIECE {
-                        sums[k] += 2.0 * (own[entry] + halves[entry][piece][k]) * offsets[other][k];
+                        let product = twice * offsets[axis][k] * offsets[other][k];
+                        of_own[k] += own[entry] * product;
+                        of_other[k] += halves[entry][piece][k] * product;
                     }
                 }
-                let entry = axis * (axis + 1) / 2 + axis;
-                for k in 0..PIECE {
-                    let along = (own[entry] + halves[entry][piece][k]) * offsets[axis][k];
-                    squares[k] += (sums[k] + along) * offsets[axis][k];
-                }
+            }
+            let mut squares = [0.0; PIECE];
+            for k in 0..PIECE {
+                let larger = if of_own[k] > of_other[k] { of_own[k] } else { of_other[k] };
+                let sum = of_own[k] + of_other[k];
+                squares[k] = if larger < most { sum } else { f64::MAX };
             }
             target[piece] = squares;
         }

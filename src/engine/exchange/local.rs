@@ -96,8 +96,6 @@ pub struct Local<const D: usize> {
     blocks: Vec<Vec<Vec<f64>>>,
     /// The same in the order of cells.
     columns: Vec<Vec<f64>>,
-    /// No metric is less than this one, the same along all axes.
-    least: f64,
 }
 
 /// How a dispersion becomes a kernel.
@@ -120,7 +118,6 @@ pub struct Metrics<'a> {
     pub halves: &'a [Vec<f64>],
     /// `2 D Δt/h²`
     pub shares: &'a [f64],
-    pub least: f64,
 }
 
 impl<const D: usize> Local<D> {
@@ -142,14 +139,13 @@ impl<const D: usize> Local<D> {
             rule: Rule::new(planned, &sizes, dt),
             blocks: Vec::new(),
             columns: Vec::new(),
-            least: 0.0,
         }))
     }
 
     /// The same, to go another way from here.
     pub fn copy(&self) -> Self {
         let (tensors, rule) = (self.tensors.clone(), self.rule.clone());
-        Self { tensors, rule, blocks: Vec::new(), columns: Vec::new(), least: 0.0 }
+        Self { tensors, rule, blocks: Vec::new(), columns: Vec::new() }
     }
 
     /// Works out the kernels of all parcels for steps of `dt_of_bandwidth`, of which one of `dt` is taken; half the mean
@@ -162,29 +158,24 @@ impl<const D: usize> Local<D> {
     ) -> Result<[f64; D], RunError> {
         let n_entries = D * (D + 1) / 2;
         self.blocks.resize_with(blocks.len(), Vec::new);
-        let mut tasks: Vec<_> = self
-            .blocks
-            .iter_mut()
-            .zip(blocks)
-            .map(|(own, block)| (own, block, Found::<D>::default()))
-            .collect();
+        let mut tasks: Vec<_> =
+            self.blocks.iter_mut().zip(blocks).map(|(own, block)| (own, block, [0.0_f64; D])).collect();
         let (tensors, rule) = (&self.tensors, &self.rule);
-        parallel::for_each(&mut tasks, &|_, (own, block, found)| {
+        parallel::for_each(&mut tasks, &|_, (own, block, extents)| {
             own.resize_with(n_entries + 1, Vec::new);
             own.iter_mut().for_each(|column| column.resize(block.n_particles, 0.0));
             tensors.of_block(block, width, own);
-            *found = rule.fill::<D>(own, (dt_of_bandwidth, dt));
+            *extents = rule.fill::<D>(own, (dt_of_bandwidth, dt));
         });
-        let mut all = Found::<D>::default();
-        for (.., found) in &tasks {
-            all.add(found);
+        let mut sum = [0.0_f64; D];
+        for (.., extents) in &tasks {
+            sum.iter_mut().zip(extents).for_each(|(sum, own)| *sum += own);
         }
-        if !(all.widest.is_finite() && all.extents.iter().all(|extent| extent.is_finite())) {
+        if !sum.iter().all(|extent| extent.is_finite()) {
             return Err(unsound("a dispersion that is no number where a parcel is"));
         }
-        self.least = 0.5 / all.widest;
         let n: usize = blocks.iter().map(|block| block.n_particles).sum();
-        Ok(all.extents.map(|extent| radius * extent / n.max(1) as f64))
+        Ok(sum.map(|extent| radius * extent / n.max(1) as f64))
     }
 
     /// Brings them into the order of cells.
@@ -198,28 +189,7 @@ impl<const D: usize> Local<D> {
 
     pub fn metrics(&self) -> Option<Metrics<'_>> {
         let (shares, halves) = self.columns.split_last()?;
-        Some(Metrics { halves, shares, least: self.least })
-    }
-}
-
-/// What is summed over parcels.
-struct Found<const D: usize> {
-    /// Largest extent of a kernel's square, m².
-    widest: f64,
-    /// Sums of half extents, in bandwidths times m.
-    extents: [f64; D],
-}
-
-impl<const D: usize> Default for Found<D> {
-    fn default() -> Self {
-        Self { widest: f64::MIN_POSITIVE, extents: [0.0; D] }
-    }
-}
-
-impl<const D: usize> Found<D> {
-    fn add(&mut self, other: &Self) {
-        self.widest = self.widest.max(other.widest);
-        self.extents.iter_mut().zip(other.extents).for_each(|(sum, own)| *sum += own);
+        Some(Metrics { halves, shares })
     }
 }
 
@@ -244,9 +214,9 @@ impl Rule {
     /// - Symbols: `h` bandwidth by the rule of the scene, with the collocation length of the place.
     /// - Range: where there is no dispersion along some direction nothing is exchanged.
     /// - Source: methods, section 6.4; halves, as a pair has `½ (H_i⁻¹ + H_j⁻¹)`.
-    /// - Shape: in place.
-    fn fill<const D: usize>(&self, columns: &mut [Vec<f64>], (dt_of_bandwidth, dt): (f64, f64)) -> Found<D> {
-        let mut found = Found::<D>::default();
+    /// - Shape: in place; sums of half extents along each axis are handed back, in m.
+    fn fill<const D: usize>(&self, columns: &mut [Vec<f64>], (dt_of_bandwidth, dt): (f64, f64)) -> [f64; D] {
+        let mut extents = [0.0; D];
         let n_entries = D * (D + 1) / 2;
         let n = columns[n_entries].len();
         let mut tensor = [0.0; 6];
@@ -272,22 +242,16 @@ impl Rule {
             };
             let size = if is_there { mean } else { 1.0 };
             let square = width * width / size;
-            let mut norm = 0.0;
-            for row in 0..D {
-                for column in 0..=row {
-                    let entry = row * (row + 1) / 2 + column;
-                    columns[entry][idx] = 0.5 * inverse[entry] / square;
-                    let own = if is_there { square * tensor[entry] } else { 0.0 };
-                    norm += if row == column { own * own } else { 2.0 * own * own };
-                    if row == column {
-                        found.extents[row] += own.sqrt();
-                    }
-                }
+            for entry in 0..n_entries {
+                columns[entry][idx] = 0.5 * inverse[entry] / square;
             }
-            found.widest = found.widest.max(norm.sqrt());
+            for axis in 0..D {
+                let own = tensor[axis * (axis + 1) / 2 + axis];
+                extents[axis] += if is_there { (square * own).sqrt() } else { 0.0 };
+            }
             columns[n_entries][idx] = share;
         }
-        found
+        extents
     }
 }
 
