@@ -27,6 +27,7 @@ fn plan(d: usize, n: u64, kernel: &str, neighbours: f64, n_steps: u64) -> Plan {
         diffusion: (0..d)
             .flat_map(|row| (0..=row).map(move |column| f64::from(u8::from(row == column))))
             .collect(),
+        spreading: None,
         cutoff: if support.is_finite() { Cutoff::default() } else { Cutoff::Radius(radius) },
         is_compensated: true,
         normalisation: Normalisation::Arithmetic,

@@ -24,7 +24,7 @@ mod table {
     pub(super) const PAIR: f64 = 2.5;
     pub(super) const PAIR_VALUE: f64 = 0.5;
     /// Neighbours where each parcel has a kernel of its own: more of them are looked at.
-    pub(super) const OWN_KERNELS: f64 = 2.5;
+    pub(super) const OWN_KERNELS: f64 = 4.0;
     /// Relaxation of one stored value.
     pub(super) const MIX: f64 = 0.7;
     /// One reaction of a particle in closed form, with reading and writing it.
