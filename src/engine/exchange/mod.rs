@@ -28,8 +28,10 @@ pub struct Exchange<const D: usize> {
     space: Space<D>,
     profile: Profile,
     sorted: Sorted,
+    /// What the weights of the parcels as they are sorted are made of.
+    factors: Vec<f64>,
     columns: Vec<Vec<f64>>,
-    lists: Pool<Near>,
+    lists: Pool<Near<D>>,
 }
 
 /// A value that is wrong after an exchange.
@@ -58,6 +60,7 @@ impl<const D: usize> Exchange<D> {
             space,
             profile,
             sorted: Sorted::default(),
+            factors: Vec::new(),
             columns: Vec::new(),
             lists: Pool::new(),
         }))
@@ -71,6 +74,7 @@ impl<const D: usize> Exchange<D> {
             space: self.space.clone(),
             profile: self.profile.clone(),
             sorted: Sorted::default(),
+            factors: Vec::new(),
             columns: Vec::new(),
             lists: Pool::new(),
         }
@@ -95,16 +99,31 @@ impl<const D: usize> Exchange<D> {
         if carried.is_empty() {
             return Ok(None);
         }
-        self.sorted.sort(&self.space, blocks);
+        // Of parcels that stand where they stood, all but the values is known.
+        let is_at_rest = self.sorted.stands(&self.space, blocks);
+        if !is_at_rest {
+            self.sorted.sort(&self.space, blocks);
+        }
         self.columns.resize_with(carried.len(), Vec::new);
         for (values, &column) in self.columns.iter_mut().zip(&carried) {
             self.sorted.gather(blocks, column, values);
         }
         let crowd = self.sorted.crowd(&self.space);
-        let normalisation = self.planned.normalisation;
-        let mut operator = Operator::new(crowd, &self.profile, normalisation, width, &self.lists);
         let beta = self.beta(dt);
+        let mut operator = Operator {
+            crowd,
+            profile: &self.profile,
+            normalisation: self.planned.normalisation,
+            width,
+            lists: &self.lists,
+            factors: std::mem::take(&mut self.factors),
+            caps: Vec::new(),
+        };
+        if !is_at_rest {
+            operator.weigh();
+        }
         integrate::step(&mut operator, self.planned.integration, beta, &mut self.columns);
+        self.factors = operator.factors;
         let mut wrong = None;
         for (values, &column) in self.columns.iter().zip(&carried) {
             let found = self.sorted.give_back(blocks, column, values, limits[column / n_slots]);
