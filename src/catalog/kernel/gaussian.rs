@@ -1,7 +1,7 @@
 //! The normal distribution.
 
 use super::{Item, Radial};
-use crate::maths::vector::exp;
+use crate::maths::vector::exp_of_negative;
 
 #[derive(Debug, Clone, Copy)]
 pub struct Gaussian;
@@ -9,7 +9,7 @@ pub struct Gaussian;
 impl Radial for Gaussian {
     #[inline(always)]
     fn value(self, q2: f64) -> f64 {
-        exp(-0.5 * q2)
+        exp_of_negative(-0.5 * q2)
     }
 
     /// It is its own: `−W′/q = W`.

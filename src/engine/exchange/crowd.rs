@@ -34,6 +34,26 @@ impl Sorted {
         Crowd { space, n: self.places.len(), y, first: &self.first }
     }
 
+    /// Whether all parcels are where they were when they were sorted, to the last bit.
+    pub fn stands<const D: usize>(&self, space: &Space<D>, blocks: &[Block<D>]) -> bool {
+        let n: usize = blocks.iter().map(|block| block.n_particles).sum();
+        if n != self.places.len() || n == 0 {
+            return false;
+        }
+        let are_still = |first: usize, places: &[u32]| {
+            places.iter().enumerate().all(|(idx, &place)| {
+                let (block, at) = split(place);
+                let x = std::array::from_fn(|axis| blocks[block].positions[axis][at]);
+                let y = space.of(x);
+                (0..D).all(|axis| y[axis].to_bits() == self.y[axis][first + idx].to_bits())
+            })
+        };
+        // What walks is found out by the first of them.
+        let parts: Vec<&[u32]> = self.places.chunks(BLOCK).collect();
+        are_still(0, &self.places[..n.min(64)])
+            && parallel::map(parts.len(), &|part| are_still(part * BLOCK, parts[part])).iter().all(|&own| own)
+    }
+
     /// Sorts all parcels anew: by cell, and within a cell by number.
     pub fn sort<const D: usize>(&mut self, space: &Space<D>, blocks: &[Block<D>]) {
         self.ranks.resize_with(blocks.len(), Vec::new);

@@ -5,9 +5,10 @@
 
 #![allow(clippy::needless_range_loop)] // Zipped iterators are not always inlined; these loops are hot.
 
+use super::around::{Around, PIECE};
 use super::local::Metrics;
 use super::matrix::{Triangle, determinant, inverse};
-use super::near::{Crowd, Near, PIECE};
+use super::near::Crowd;
 
 /// Added to extents, relative: rounding must not cut off what is just within them.
 const SLACK: f64 = 1e-9;
@@ -125,11 +126,11 @@ fn nearest((low, high): (f64, f64)) -> f64 {
     }
 }
 
-impl Near {
+impl Around {
     /// Finds everything that the kernel of parcel `idx` reaches, with distances in the mean metric of each pair, and somewhat
     /// more, which is out of reach.
     #[inline(always)]
-    pub fn find_within<const D: usize>(&mut self, crowd: &Crowd<D>, metrics: &Metrics, idx: usize) {
+    pub fn find<const D: usize>(&mut self, crowd: &Crowd<D>, metrics: &Metrics, idx: usize) {
         self.rows.clear();
         self.n = 0;
         let mut y = [0.0; D];

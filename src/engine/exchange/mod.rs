@@ -2,6 +2,7 @@
 //!
 //! Owns one step of it. May use blocks, kernels and `parallel`. It deliberately moves nothing: places stay as they are.
 
+mod around;
 mod crowd;
 mod ellipse;
 mod in_run;
@@ -10,6 +11,7 @@ mod local;
 mod matrix;
 mod near;
 mod operator;
+mod own_kernels;
 mod space;
 mod table;
 
@@ -22,6 +24,7 @@ use crate::plan::exchange::{Exchange as Planned, Sizes};
 use crate::plan::transport::{Patch, SideRule};
 use crate::plan::{Axis, Plan, Side};
 use crate::state::particles::Block;
+use around::Around;
 use crowd::{MOST_BLOCKS, Sorted};
 use local::Local;
 use near::Near;
@@ -37,8 +40,11 @@ pub struct Exchange<const D: usize> {
     local: Option<Local<D>>,
     profile: Profile,
     sorted: Sorted,
+    /// What the weights of the parcels as they are sorted are made of.
+    factors: Vec<f64>,
     columns: Vec<Vec<f64>>,
-    lists: Pool<Near>,
+    lists: Pool<Near<D>>,
+    own_lists: Pool<Around>,
 }
 
 /// The axes of a plan with what sides are to an exchange: nothing disperses through those that water flows through.
@@ -84,8 +90,10 @@ impl<const D: usize> Exchange<D> {
             local: Local::new(plan, planned, settings)?,
             profile,
             sorted: Sorted::default(),
+            factors: Vec::new(),
             columns: Vec::new(),
             lists: Pool::new(),
+            own_lists: Pool::new(),
         }))
     }
 
@@ -98,8 +106,10 @@ impl<const D: usize> Exchange<D> {
             local: self.local.as_ref().map(Local::copy),
             profile: self.profile.clone(),
             sorted: Sorted::default(),
+            factors: Vec::new(),
             columns: Vec::new(),
             lists: Pool::new(),
+            own_lists: Pool::new(),
         }
     }
 
@@ -123,7 +133,11 @@ impl<const D: usize> Exchange<D> {
             return Ok(None);
         }
         self.look(program, blocks, (dt, width))?;
-        self.sorted.sort(&self.space, blocks);
+        // Of parcels that stand where they stood, all but the values is known; kernels may hang on the length of a step.
+        let is_at_rest = self.local.is_none() && self.sorted.stands(&self.space, blocks);
+        if !is_at_rest {
+            self.sorted.sort(&self.space, blocks);
+        }
         if let Some(local) = &mut self.local {
             local.sort(&self.sorted);
         }
@@ -132,11 +146,23 @@ impl<const D: usize> Exchange<D> {
             self.sorted.gather(blocks, column, values);
         }
         let crowd = self.sorted.crowd(&self.space);
-        let normalisation = self.planned.normalisation;
-        let around = (crowd, self.local.as_ref().and_then(Local::metrics));
-        let mut operator = Operator::new(around, &self.profile, normalisation, width, &self.lists);
         let beta = self.beta(dt);
+        let mut operator = Operator {
+            crowd,
+            metrics: self.local.as_ref().and_then(Local::metrics),
+            profile: &self.profile,
+            normalisation: self.planned.normalisation,
+            width,
+            lists: &self.lists,
+            own_lists: &self.own_lists,
+            factors: std::mem::take(&mut self.factors),
+            caps: Vec::new(),
+        };
+        if !is_at_rest {
+            operator.weigh();
+        }
         integrate::step(&mut operator, self.planned.integration, beta, &mut self.columns);
+        self.factors = operator.factors;
         let mut wrong = None;
         for (values, &column) in self.columns.iter().zip(&carried) {
             let found = self.sorted.give_back(blocks, column, values, limits[column / n_slots]);

@@ -1,21 +1,38 @@
-//! The neighbours of one parcel, and their weights.
+//! The neighbours of some parcels that lie together, and their weights.
 //!
 //! Owns the search through cells and the sums over what is found. May use kernels and the space. It deliberately
 //! writes to nothing but its own lists: every parcel gathers for itself, so that sums never hang on threads.
+//!
+//! What may be near any of the parcels of a group is copied together once. Each of them then sifts it, sixty-four at a
+//! time, and works with what is left.
 
 #![allow(clippy::needless_range_loop)] // Zipped iterators are not always inlined; these loops are hot.
 
-use super::space::Space;
+use super::space::{Image, Space};
 use crate::catalog::kernel::Radial;
 
 /// Lanes of a sum: the same for wide and narrow code.
-const LANES: usize = 8;
+pub const LANES: usize = 8;
 
 /// Numbers that are read or written together: rows are taken in whole pieces, beyond their ends.
-pub(super) const PIECE: usize = 4;
+const PIECE: usize = 4;
 
 /// What every array of a crowd is longer than it, so that whole pieces can be read.
 pub const PADDING: usize = PIECE;
+
+/// Parcels of a group, at most.
+pub const MOST_TARGETS: usize = 16;
+
+/// Candidates copied together at once: what fits beside each other in the nearest cache.
+const ROOM: usize = 1024;
+
+/// Where one stands that is near nobody.
+const NOBODY: usize = ROOM - 1;
+const MOST: usize = ROOM - SIFTED;
+const FAR: f64 = 1e150;
+
+/// Candidates sifted at once: the bits of a mask.
+const SIFTED: usize = 32;
 
 /// Parcels in the order of cells.
 #[derive(Clone, Copy)]
@@ -28,164 +45,231 @@ pub struct Crowd<'a, const D: usize> {
     pub first: &'a [u32],
 }
 
-/// Squared distances of what is near, later weights, row by row of cells.
-#[derive(Debug, Default)]
-pub struct Near {
-    pub(super) weights: Vec<f64>,
-    /// Something else of the same parcels.
-    others: Vec<f64>,
-    /// Where a row stands among all parcels, and how many it has.
-    pub(super) rows: Vec<(usize, usize)>,
-    pub(super) n: usize,
-    /// `n`, and what is missing in the last lanes.
+/// Candidates side by side in memory, seen at once through an image.
+#[derive(Debug, Clone, Copy)]
+struct Row<const D: usize> {
+    start: usize,
     end: usize,
-    /// Where the parcel itself stands.
-    own: usize,
+    image: Image<D>,
 }
 
-impl Near {
-    /// Finds everything within reach of parcel `idx`, and somewhat more.
+/// Lists of a group, reused from one to the next.
+pub struct Near<const D: usize> {
+    rows: Vec<Row<D>>,
+    /// Rows that are copied, and how much of the next one.
+    n_rows: usize,
+    n_within: usize,
+    /// Candidates: places, and what else they have.
+    places: [[f64; ROOM]; D],
+    carried: Vec<[f64; ROOM]>,
+    /// Theirs, and what is missing in the last sixty-four.
+    n: usize,
+    /// Squared distances of the candidates from one parcel, and which of them are near.
+    squares: [f64; ROOM],
+    found: [u8; 2 * ROOM],
+    n_found: usize,
+    /// Of those that are near: squared distances, later weights, and something else.
+    weights: [f64; ROOM],
+    others: [f64; ROOM],
+}
+
+impl<const D: usize> Near<D> {
+    pub fn new() -> Box<Self> {
+        Box::new(Self {
+            rows: Vec::new(),
+            n_rows: 0,
+            n_within: 0,
+            places: [[0.0; ROOM]; D],
+            carried: Vec::new(),
+            n: 0,
+            // Beyond all candidates stands nobody.
+            squares: [f64::MAX; ROOM],
+            found: [0; 2 * ROOM],
+            n_found: 0,
+            weights: [0.0; ROOM],
+            others: [0.0; ROOM],
+        })
+    }
+
+    /// How many parcels from `first` on lie together, of `n`; and finds the rows of cells that the kernel reaches from
+    /// any of them.
     #[inline(always)]
-    pub fn find<const D: usize>(&mut self, crowd: &Crowd<D>, idx: usize) {
+    pub fn gather_round(&mut self, crowd: &Crowd<D>, first: usize, n: usize) -> usize {
+        let space = crowd.space;
+        let (mut low, mut high) = ([0.0; D], [0.0; D]);
+        for axis in 0..D {
+            (low[axis], high[axis]) = (crowd.y[axis][first], crowd.y[axis][first]);
+        }
+        let mut n_targets = 1;
+        while n_targets < n && n_targets < MOST_TARGETS {
+            let mut is_together = true;
+            for axis in 0..D {
+                let y = crowd.y[axis][first + n_targets];
+                is_together &= (y - crowd.y[axis][first]).abs() <= space.together[axis];
+            }
+            if !is_together {
+                break;
+            }
+            for axis in 0..D {
+                let y = crowd.y[axis][first + n_targets];
+                low[axis] = if y < low[axis] { y } else { low[axis] };
+                high[axis] = if y > high[axis] { y } else { high[axis] };
+            }
+            n_targets += 1;
+        }
         self.rows.clear();
-        self.n = 0;
+        (self.n_rows, self.n_within) = (0, 0);
+        self.look(crowd, (low, high), Image::NONE);
+        for &image in space.images((low, high)) {
+            let seen = image.of_box((low, high));
+            if space.is_near(seen) {
+                self.look(crowd, seen, image);
+            }
+        }
+        n_targets
+    }
+
+    /// Rows of cells that the kernel reaches from a box.
+    #[inline(always)]
+    fn look(&mut self, crowd: &Crowd<D>, (low, high): ([f64; D], [f64; D]), image: Image<D>) {
+        let space = crowd.space;
+        let radius = space.reach();
+        let planes =
+            if D > 1 { space.along(0, low[0] - radius)..=space.along(0, high[0] + radius) } else { 0..=0 };
+        for plane in planes {
+            let d = if D > 1 { space.gap(0, plane, low[0], high[0]) } else { 0.0 };
+            let rows = if D > 2 {
+                let across = space.rest(d * d);
+                space.along(1, low[1] - across)..=space.along(1, high[1] + across)
+            } else {
+                0..=0
+            };
+            for row in rows {
+                let e = if D > 2 { space.gap(1, row, low[1], high[1]) } else { 0.0 };
+                let reach = if D > 1 { space.rest(d * d + e * e) } else { radius };
+                let line = if D > 2 { space.row(plane, row) } else { plane };
+                let cell = line * space.row_length();
+                let from = space.along(D - 1, low[D - 1] - reach);
+                let to = space.along(D - 1, high[D - 1] + reach);
+                let (start, end) = (crowd.first[cell + from] as usize, crowd.first[cell + to + 1] as usize);
+                if end > start {
+                    self.rows.push(Row { start, end, image });
+                }
+            }
+        }
+    }
+
+    /// Copies the next candidates together, with what they have in each of the sources; whether there were any left.
+    #[inline(always)]
+    pub fn fill(&mut self, crowd: &Crowd<D>, sources: &[&[f64]]) -> bool {
+        if self.n_rows == self.rows.len() {
+            return false;
+        }
+        if self.carried.len() < sources.len() {
+            self.carried.resize(sources.len(), [1.0; ROOM]);
+        }
+        let mut n = 0;
+        while self.n_rows < self.rows.len() && n < MOST {
+            let Row { start, end, image } = self.rows[self.n_rows];
+            let start = start + self.n_within;
+            let taken = if end - start > MOST - n { MOST - n } else { end - start };
+            self.n_within += taken;
+            if start + taken == end {
+                self.n_rows += 1;
+                self.n_within = 0;
+            }
+            let whole = taken.next_multiple_of(PIECE);
+            for axis in 0..D {
+                let (sign, shift) = (image.sign[axis], image.shift[axis]);
+                let (source, _) = crowd.y[axis][start..start + whole].as_chunks::<PIECE>();
+                let (target, _) = self.places[axis][n..n + whole].as_chunks_mut::<PIECE>();
+                for piece in 0..target.len().min(source.len()) {
+                    for k in 0..PIECE {
+                        // The image of an image is the place itself.
+                        target[piece][k] = sign * (source[piece][k] - shift);
+                    }
+                }
+            }
+            for column in 0..sources.len() {
+                let (source, _) = sources[column][start..start + whole].as_chunks::<PIECE>();
+                let (target, _) = self.carried[column][n..n + whole].as_chunks_mut::<PIECE>();
+                // A call to copy so few costs more than the loop.
+                #[allow(clippy::manual_memcpy)]
+                for piece in 0..target.len().min(source.len()) {
+                    target[piece] = source[piece];
+                }
+            }
+            n += taken;
+        }
+        self.n = n.next_multiple_of(SIFTED);
+        for axis in 0..D {
+            for place in &mut self.places[axis][n..self.n] {
+                *place = FAR;
+            }
+        }
+        true
+    }
+
+    /// Finds the candidates that are near parcel `idx`, and their squared distances.
+    #[inline(always)]
+    pub fn find(&mut self, crowd: &Crowd<D>, idx: usize) {
         let mut y = [0.0; D];
         for axis in 0..D {
             y[axis] = crowd.y[axis][idx];
         }
-        self.look(crowd, y);
-        self.find_own(idx);
-        for image in crowd.space.images(y) {
-            let y = image.of(y);
-            if crowd.space.is_near(y) {
-                self.look(crowd, y);
-            }
+        self.sift(y, crowd.space.radius * crowd.space.radius);
+        let end = self.n_found.next_multiple_of(LANES);
+        for at in self.n_found..end {
+            (self.found[2 * at], self.found[2 * at + 1]) = (NOBODY as u8, (NOBODY >> 8) as u8);
         }
-        self.close();
+        self.n_found = end;
+        pick(&self.squares, &self.found, &mut self.weights[..end]);
     }
 
-    /// Where parcel `idx` itself stands in its rows.
+    /// Numbers of the candidates within the radius of a place, in their order.
     #[inline(always)]
-    pub(super) fn find_own(&mut self, idx: usize) {
-        let mut at = 0;
-        for row in 0..self.rows.len() {
-            let (start, n) = self.rows[row];
-            if idx >= start && idx < start + n {
-                self.own = at + idx - start;
-            }
-            at += n;
-        }
-    }
-
-    /// The rest of the last lanes is out of reach.
-    #[inline(always)]
-    pub(super) fn close(&mut self) {
-        self.end = self.n.next_multiple_of(LANES);
-        self.make_room(0);
-        self.weights[self.n..self.end].fill(f64::MAX);
-    }
-
-    /// Rows of cells that the kernel reaches from a place.
-    #[inline(always)]
-    fn look<const D: usize>(&mut self, crowd: &Crowd<D>, y: [f64; D]) {
-        let space = crowd.space;
-        let radius = space.reach();
-        match D {
-            1 => self.row(crowd, y, 0, radius),
-            2 => {
-                let last = space.along(0, y[0] + radius);
-                for row in space.along(0, y[0] - radius)..=last {
-                    let d = space.distance(0, row, y[0]);
-                    self.row(crowd, y, row, space.rest(d * d));
-                }
-            }
-            _ => {
-                let last = space.along(0, y[0] + radius);
-                for plane in space.along(0, y[0] - radius)..=last {
-                    let d = space.distance(0, plane, y[0]);
-                    let across = space.rest(d * d);
-                    let (first, last) = (space.along(1, y[1] - across), space.along(1, y[1] + across));
-                    for row in first..=last {
-                        let e = space.distance(1, row, y[1]);
-                        self.row(crowd, y, space.row(plane, row), space.rest(d * d + e * e));
-                    }
-                }
-            }
-        }
-    }
-
-    /// Squared distances along one row.
-    #[inline(always)]
-    fn row<const D: usize>(&mut self, crowd: &Crowd<D>, y: [f64; D], row: usize, reach: f64) {
-        let space = crowd.space;
-        let cell = row * space.row_length();
-        let (low, high) = (space.along(D - 1, y[D - 1] - reach), space.along(D - 1, y[D - 1] + reach));
-        let (start, end) = (crowd.first[cell + low] as usize, crowd.first[cell + high + 1] as usize);
-        let n = end - start;
-        if n == 0 {
-            return;
-        }
-        self.rows.push((start, n));
-        self.make_room(n);
-        let whole = n.next_multiple_of(PIECE);
-        let (target, _) = self.weights[self.n..self.n + whole].as_chunks_mut::<PIECE>();
+    fn sift(&mut self, y: [f64; D], square: f64) {
         let mut columns = [&[][..]; D];
         for axis in 0..D {
-            columns[axis] = crowd.y[axis][start..start + whole].as_chunks::<PIECE>().0;
+            columns[axis] = self.places[axis][..self.n].as_chunks::<SIFTED>().0;
         }
-        for piece in 0..target.len() {
-            let mut squares = [0.0; PIECE];
-            for axis in 0..D {
-                let column = &columns[axis][piece];
-                for k in 0..PIECE {
-                    let d = column[k] - y[axis];
-                    squares[k] += d * d;
+        let (squares, _) = self.squares[..self.n].as_chunks_mut::<SIFTED>();
+        let mut n = 0;
+        for block in 0..squares.len() {
+            // One loop each: nested ones are vectorised across pieces.
+            for at in 0..SIFTED {
+                let mut sum = 0.0;
+                for axis in 0..D {
+                    let d = columns[axis][block][at] - y[axis];
+                    sum += d * d;
                 }
+                squares[block][at] = sum;
             }
-            target[piece] = squares;
-        }
-        self.n += n;
-    }
-
-    /// Room for `n` more, whole pieces and lanes.
-    #[inline(always)]
-    pub(super) fn make_room(&mut self, n: usize) {
-        if self.weights.len() < self.n + n + LANES {
-            self.grow(n);
-        }
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn grow(&mut self, n: usize) {
-        let len = (self.n + n + LANES).next_power_of_two();
-        self.weights.resize(len, 0.0);
-        self.others.resize(len, 0.0);
-    }
-
-    /// Brings what an array has for the same parcels together.
-    #[inline(always)]
-    fn fetch(&mut self, source: &[f64]) {
-        let mut at = 0;
-        for row in 0..self.rows.len() {
-            let (start, n) = self.rows[row];
-            let whole = n.next_multiple_of(PIECE);
-            let (target, _) = self.others[at..at + whole].as_chunks_mut::<PIECE>();
-            let (pieces, _) = source[start..start + whole].as_chunks::<PIECE>();
-            // A call to copy so few costs more than the loop.
-            #[allow(clippy::manual_memcpy)]
-            for piece in 0..target.len().min(pieces.len()) {
-                target[piece] = pieces[piece];
+            let mut mask = 0_u32;
+            for at in 0..SIFTED {
+                mask |= if squares[block][at] < square { 1 << at } else { 0 };
             }
-            at += n;
+            for piece in 0..SIFTED / LANES {
+                let bits = (mask >> (piece * LANES)) as u8;
+                let first = (block * SIFTED + piece * LANES) as u64 * ONES;
+                let [low, high] = SETS[usize::from(bits)];
+                // Calls to copy so few bytes are not inlined; an assignment is one store.
+                if let Some(target) = self.found[2 * n..].first_chunk_mut::<LANES>() {
+                    *target = (low + first).to_le_bytes();
+                }
+                if let Some(target) = self.found[2 * n + LANES..].first_chunk_mut::<LANES>() {
+                    *target = (high + first).to_le_bytes();
+                }
+                n += bits.count_ones() as usize;
+            }
         }
-        self.others[self.n..self.end].fill(1.0);
+        self.n_found = n;
     }
 
     /// Squared distances become values of a kernel.
     #[inline(always)]
     pub fn weigh<K: Radial>(&mut self, kernel: K, square: f64) {
-        for weight in &mut self.weights[..self.end] {
+        for weight in &mut self.weights[..self.n_found] {
             let value = kernel.value(*weight);
             *weight = if *weight < square { value } else { 0.0 };
         }
@@ -194,7 +278,7 @@ impl Near {
     /// Squared distances become what two exchange by.
     #[inline(always)]
     pub fn force<K: Radial>(&mut self, kernel: K, square: f64) {
-        for weight in &mut self.weights[..self.end] {
+        for weight in &mut self.weights[..self.n_found] {
             let value = kernel.force(*weight);
             *weight = if *weight < square { value } else { 0.0 };
         }
@@ -202,91 +286,106 @@ impl Near {
 
     /// `w_ij ← 2 w_ij / (ρ_i + ρ_j)`
     #[inline(always)]
-    pub fn divide_by_mean(&mut self, densities: &[f64], own: f64) {
-        self.fetch(densities);
-        let (weights, others) = (&mut self.weights[..self.end], &self.others[..self.end]);
-        for idx in 0..weights.len() {
-            weights[idx] *= 2.0 / (own + others[idx]);
-        }
-    }
-
-    /// `w_ij ← 2 w_ij b_ij / (ρ_i + ρ_j)`, `b_ij = 2 b_i b_j/(b_i + b_j)`.
-    #[inline(always)]
-    pub fn share_by_mean(&mut self, densities: &[f64], own: f64, shares: &[f64], share: f64) {
-        self.divide_by_mean(densities, own);
-        self.fetch(shares);
-        let (weights, others) = (&mut self.weights[..self.end], &self.others[..self.end]);
-        for idx in 0..weights.len() {
-            let sum = share + others[idx];
-            // Two that exchange nothing.
-            let mean = 2.0 * share * others[idx] / if sum > 0.0 { sum } else { 1.0 };
-            weights[idx] *= mean;
+    pub fn divide_by_mean(&mut self, column: usize, own: f64) {
+        let (weights, others) = self.weights_and(column);
+        for at in 0..weights.len() {
+            weights[at] *= 2.0 / (own + others[at]);
         }
     }
 
     /// `w_ij ← w_ij s_i s_j`
     #[inline(always)]
-    pub fn multiply(&mut self, factors: &[f64], own: f64) {
-        self.fetch(factors);
-        let (weights, others) = (&mut self.weights[..self.end], &self.others[..self.end]);
-        for idx in 0..weights.len() {
-            weights[idx] *= own * others[idx];
+    pub fn multiply(&mut self, column: usize, own: f64) {
+        let (weights, others) = self.weights_and(column);
+        for at in 0..weights.len() {
+            weights[at] *= own * others[at];
         }
     }
 
     /// `w_ij ← w_ij min(a_i, a_j)`
     #[inline(always)]
-    pub fn limit(&mut self, caps: &[f64], own: f64) {
-        self.fetch(caps);
-        let (weights, others) = (&mut self.weights[..self.end], &self.others[..self.end]);
-        for idx in 0..weights.len() {
-            weights[idx] *= if others[idx] < own { others[idx] } else { own };
+    pub fn limit(&mut self, column: usize, own: f64) {
+        let (weights, others) = self.weights_and(column);
+        for at in 0..weights.len() {
+            weights[at] *= if others[at] < own { others[at] } else { own };
         }
     }
 
-    /// Sum of all weights.
+    /// Weights, and what those that are near have in a column.
     #[inline(always)]
-    pub fn sum(&self) -> f64 {
-        let mut lanes = [0.0; LANES];
-        let (pieces, _) = self.weights[..self.end].as_chunks::<LANES>();
+    fn weights_and(&mut self, column: usize) -> (&mut [f64], &[f64]) {
+        let end = self.n_found;
+        pick(&self.carried[column], &self.found, &mut self.others[..end]);
+        (&mut self.weights[..end], &self.others[..end])
+    }
+
+    /// Adds all weights.
+    #[inline(always)]
+    pub fn sum(&self, lanes: &mut [f64; LANES]) {
+        let mut sums = *lanes;
+        let (pieces, _) = self.weights[..self.n_found].as_chunks::<LANES>();
         for piece in pieces {
             for lane in 0..LANES {
-                lanes[lane] += piece[lane];
+                sums[lane] += piece[lane];
             }
         }
-        folded(lanes)
+        *lanes = sums;
     }
 
-    /// Sum of the weights of all others.
+    /// Adds `Σ_j w_ij (v_j − v_i)`.
     #[inline(always)]
-    pub fn sum_of_others(&self) -> f64 {
-        self.sum() - self.weights[self.own]
-    }
-
-    /// Sum of weights times factors.
-    #[inline(always)]
-    pub fn sum_of(&mut self, factors: &[f64]) -> f64 {
-        self.difference(factors, 0.0)
-    }
-
-    /// `Σ_j w_ij (v_j − v_i)`
-    #[inline(always)]
-    pub fn difference(&mut self, values: &[f64], own: f64) -> f64 {
-        self.fetch(values);
-        let mut lanes = [0.0; LANES];
-        let (weights, _) = self.weights[..self.end].as_chunks::<LANES>();
-        let (others, _) = self.others[..self.end].as_chunks::<LANES>();
+    pub fn difference(&mut self, column: usize, own: f64, lanes: &mut [f64; LANES]) {
+        let mut sums = *lanes;
+        let (weights, others) = self.weights_and(column);
+        let (weights, _) = weights.as_chunks::<LANES>();
+        let (others, _) = others.as_chunks::<LANES>();
         for piece in 0..weights.len().min(others.len()) {
-            let (weights, others) = (&weights[piece], &others[piece]);
             for lane in 0..LANES {
-                lanes[lane] += weights[lane] * (others[lane] - own);
+                sums[lane] += weights[piece][lane] * (others[piece][lane] - own);
             }
         }
-        folded(lanes)
+        *lanes = sums;
     }
 }
 
+/// What those that are near have, side by side.
 #[inline(always)]
-fn folded(lanes: [f64; LANES]) -> f64 {
+fn pick(source: &[f64; ROOM], found: &[u8; 2 * ROOM], target: &mut [f64]) {
+    let (target, _) = target.as_chunks_mut::<LANES>();
+    let (found, _) = found.as_chunks::<{ 2 * LANES }>();
+    for piece in 0..target.len().min(found.len()) {
+        for k in 0..LANES {
+            let idx = u16::from_le_bytes([found[piece][2 * k], found[piece][2 * k + 1]]);
+            target[piece][k] = source[usize::from(idx) % ROOM];
+        }
+    }
+}
+
+/// A sum of lanes, in a fixed order.
+#[inline(always)]
+pub fn folded(lanes: [f64; LANES]) -> f64 {
     ((lanes[0] + lanes[4]) + (lanes[2] + lanes[6])) + ((lanes[1] + lanes[5]) + (lanes[3] + lanes[7]))
+}
+
+/// Four numbers of 16 bits that are one.
+const ONES: u64 = 0x0001_0001_0001_0001;
+
+/// By the bits of a mask: which of eight are set, one after the other, in 16 bits each.
+static SETS: [[u64; 2]; 1 << LANES] = sets();
+
+const fn sets() -> [[u64; 2]; 1 << LANES] {
+    let mut sets = [[0; 2]; 1 << LANES];
+    let mut mask = 0;
+    while mask < sets.len() {
+        let (mut bit, mut n) = (0, 0);
+        while bit < LANES {
+            if mask >> bit & 1 == 1 {
+                sets[mask][n / 4] |= (bit as u64) << (16 * (n % 4));
+                n += 1;
+            }
+            bit += 1;
+        }
+        mask += 1;
+    }
+    sets
 }

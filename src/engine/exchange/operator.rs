@@ -5,8 +5,10 @@
 #![allow(clippy::needless_range_loop)] // Zipped iterators are not always inlined; these loops are hot.
 
 use super::super::parallel::{self, Pool};
+use super::around::Around;
 use super::local::Metrics;
-use super::near::{Crowd, Near, PADDING};
+use super::near::{Crowd, LANES, MOST_TARGETS, Near, PADDING, folded};
+use super::own_kernels::OnOwnKernels;
 use super::table::Tabulated;
 use crate::catalog::kernel::{
     CubicSpline, Epanechnikov, Gaussian, QuinticSpline, Radial, WendlandC2, WendlandC4, WendlandC6,
@@ -60,7 +62,8 @@ pub struct Operator<'a, const D: usize> {
     pub profile: &'a Profile,
     pub normalisation: Normalisation,
     pub width: Width,
-    pub lists: &'a Pool<Near>,
+    pub lists: &'a Pool<Near<D>>,
+    pub own_lists: &'a Pool<Around>,
     /// Densities, or the factors of a product; by parcel.
     pub factors: Vec<f64>,
     /// What keeps sums of weights below one, by parcel; empty where nothing has to.
@@ -69,7 +72,7 @@ pub struct Operator<'a, const D: usize> {
 
 /// What a pass works out for a parcel.
 #[derive(Clone, Copy)]
-enum Wanted<'a> {
+pub(super) enum Wanted<'a> {
     /// `Σ_j w_ij`
     Densities,
     /// `Σ_j w_ij u_j`
@@ -86,39 +89,23 @@ impl<'a, const D: usize> Operator<'a, D> {
     /// - Range: parcels of equal volume; symmetric in all three cases, which conserves what they carry.
     /// - Source: methods, section 6.3; R. Sinkhorn, P. Knopp 1967, doi:10.2140/pjm.1967.21.343.
     /// - Shape: one factor per parcel.
-    pub fn new(
-        (crowd, metrics): (Crowd<'a, D>, Option<Metrics<'a>>),
-        profile: &'a Profile,
-        normalisation: Normalisation,
-        width: Width,
-        lists: &'a Pool<Near>,
-    ) -> Self {
-        let mut own = Self {
-            crowd,
-            metrics,
-            profile,
-            normalisation,
-            width,
-            lists,
-            factors: Vec::new(),
-            caps: Vec::new(),
-        };
-        let mut densities = vec![0.0; crowd.n + PADDING];
-        own.pass(Wanted::Densities, &mut [&mut densities]);
-        match normalisation {
+    pub fn weigh(&mut self) {
+        self.factors.clear();
+        let mut densities = vec![0.0; self.crowd.n + PADDING];
+        self.pass(Wanted::Densities, &mut [&mut densities]);
+        match self.normalisation {
             Normalisation::Arithmetic => {}
             Normalisation::Geometric => densities.iter_mut().for_each(|value| *value = 1.0 / value.sqrt()),
             Normalisation::Sinkhorn => {
                 densities.iter_mut().for_each(|value| *value = 1.0 / value.sqrt());
-                own.balance(&mut densities);
+                self.balance(&mut densities);
             }
         }
-        if let Some(metrics) = metrics.filter(|_| normalisation != Normalisation::Arithmetic) {
+        if let Some(metrics) = self.metrics.filter(|_| self.normalisation != Normalisation::Arithmetic) {
             // The geometric mean of two shares is the product of their roots.
             densities.iter_mut().zip(metrics.shares).for_each(|(factor, share)| *factor *= share.sqrt());
         }
-        own.factors = densities;
-        own
+        self.factors = densities;
     }
 
     /// Sinkhorn's rounds: `u_i ← √(u_i / Σ_j W_ij u_j)`.
@@ -162,14 +149,21 @@ impl<'a, const D: usize> Operator<'a, D> {
         for target in targets {
             portions.iter_mut().zip(target[..n].chunks_mut(PORTION)).for_each(|(own, part)| own.push(part));
         }
-        parallel::for_each(&mut portions, &|idx, targets| {
-            self.lists.lend(
-                || Box::new(Near::default()),
-                |near| {
+        if let Some(metrics) = self.metrics {
+            parallel::for_each(&mut portions, &|idx, targets| {
+                self.own_lists.lend(Default::default, |around| {
                     let (operator, first) = (self, idx * PORTION);
-                    self.width.run(OnPortion { operator, kernel, wanted, first, targets, near });
-                },
-            );
+                    let own = OnOwnKernels { operator, metrics, kernel, wanted, first, targets, around };
+                    self.width.run(own);
+                });
+            });
+            return;
+        }
+        parallel::for_each(&mut portions, &|idx, targets| {
+            self.lists.lend(Near::new, |near| {
+                let (operator, first) = (self, idx * PORTION);
+                self.width.run(OnPortion { operator, kernel, wanted, first, targets, near });
+            });
         });
     }
 }
@@ -181,61 +175,123 @@ struct OnPortion<'a, 'b, const D: usize, K> {
     wanted: Wanted<'a>,
     first: usize,
     targets: &'a mut [&'b mut [f64]],
-    near: &'a mut Near,
+    near: &'a mut Near<D>,
 }
 
 impl<const D: usize, K: Radial> pulp::NullaryFnOnce for OnPortion<'_, '_, D, K> {
     type Output = ();
 
     #[inline(always)]
-    fn call(self) {
-        let Self { operator, kernel, wanted, first, targets, near } = self;
-        let n = targets.first().map_or(0, |target| target.len());
-        let square = operator.crowd.space.radius * operator.crowd.space.radius;
-        for at in 0..n {
-            let idx = first + at;
-            match &operator.metrics {
-                None => near.find(&operator.crowd, idx),
-                Some(metrics) => near.find_within(&operator.crowd, metrics, idx),
+    fn call(mut self) {
+        let operator = self.operator;
+        let n = self.targets.first().map_or(0, |target| target.len());
+        let sources = operator.sources(self.wanted);
+        // One after the other: the sums of each parcel of a group.
+        let n_sums = self.targets.len();
+        let mut lanes = vec![[0.0; LANES]; MOST_TARGETS * n_sums];
+        let mut at = 0;
+        while at < n {
+            let first = self.first + at;
+            let n_targets = self.near.gather_round(&operator.crowd, first, n - at);
+            for lanes in &mut lanes[..n_targets * n_sums] {
+                *lanes = [0.0; LANES];
             }
-            match wanted {
-                Wanted::Densities => {
-                    near.weigh(kernel, square);
-                    targets[0][at] = near.sum();
+            while self.near.fill(&operator.crowd, &sources) {
+                for target in 0..n_targets {
+                    self.near.find(&operator.crowd, first + target);
+                    self.add(first + target, &mut lanes[target * n_sums..(target + 1) * n_sums]);
                 }
-                Wanted::Weighted(factors) => {
-                    near.weigh(kernel, square);
-                    targets[0][at] = near.sum_of(factors);
+            }
+            for target in 0..n_targets {
+                for sum in 0..n_sums {
+                    self.targets[sum][at + target] = folded(lanes[target * n_sums + sum]);
                 }
-                Wanted::Differences(columns) => {
-                    near.force(kernel, square);
-                    operator.normalise(near, idx);
-                    for column in 0..columns.len() {
-                        let values = &columns[column];
-                        targets[column][at] = near.difference(values, values[idx]);
-                    }
-                    if targets.len() > columns.len() {
-                        targets[columns.len()][at] = near.sum_of_others();
-                    }
+            }
+            self.leave_out_itself(first, at, n_targets);
+            at += n_targets;
+        }
+    }
+}
+
+impl<const D: usize, K: Radial> OnPortion<'_, '_, D, K> {
+    /// Adds what the candidates at hand give to the sums of a parcel.
+    #[inline(always)]
+    fn add(&mut self, idx: usize, lanes: &mut [[f64; LANES]]) {
+        let Self { operator, kernel, wanted, ref mut near, .. } = *self;
+        let square = operator.crowd.space.radius * operator.crowd.space.radius;
+        match wanted {
+            Wanted::Densities => {
+                near.weigh(kernel, square);
+                near.sum(&mut lanes[0]);
+            }
+            Wanted::Weighted(_) => {
+                near.weigh(kernel, square);
+                near.difference(0, 0.0, &mut lanes[0]);
+            }
+            Wanted::Differences(columns) => {
+                near.force(kernel, square);
+                let first = operator.normalise(near, idx);
+                for column in 0..columns.len() {
+                    near.difference(first + column, columns[column][idx], &mut lanes[column]);
                 }
+                if lanes.len() > columns.len() {
+                    near.sum(&mut lanes[columns.len()]);
+                }
+            }
+        }
+    }
+
+    /// Takes each parcel's own weight out of its sum of weights.
+    #[inline(always)]
+    fn leave_out_itself(&mut self, first: usize, at: usize, n_targets: usize) {
+        let Wanted::Differences(columns) = self.wanted else { return };
+        if self.targets.len() > columns.len() {
+            let force = self.kernel.force(0.0);
+            for target in 0..n_targets {
+                let own = self.operator.own_weight(force, first + target);
+                self.targets[columns.len()][at + target] -= own;
             }
         }
     }
 }
 
-impl<const D: usize> Operator<'_, D> {
-    #[inline(always)]
-    fn normalise(&self, near: &mut Near, idx: usize) {
-        let own = self.factors[idx];
-        match (self.normalisation, &self.metrics) {
-            (Normalisation::Arithmetic, None) => near.divide_by_mean(&self.factors, own),
-            (Normalisation::Arithmetic, Some(metrics)) => {
-                near.share_by_mean(&self.factors, own, metrics.shares, metrics.shares[idx]);
+impl<'a, const D: usize> Operator<'a, D> {
+    /// What a pass needs of every neighbour.
+    fn sources<'s>(&'s self, wanted: Wanted<'s>) -> Vec<&'s [f64]> {
+        match wanted {
+            Wanted::Densities => Vec::new(),
+            Wanted::Weighted(factors) => vec![factors],
+            Wanted::Differences(columns) => {
+                let caps = (!self.caps.is_empty()).then_some(&self.caps);
+                [&self.factors].into_iter().chain(caps).chain(columns).map(|own| &own[..]).collect()
             }
-            (Normalisation::Geometric | Normalisation::Sinkhorn, _) => near.multiply(&self.factors, own),
         }
-        if !self.caps.is_empty() {
-            near.limit(&self.caps, self.caps[idx]);
+    }
+
+    /// Forces become weights; the source that comes next.
+    #[inline(always)]
+    fn normalise(&self, near: &mut Near<D>, idx: usize) -> usize {
+        let own = self.factors[idx];
+        match self.normalisation {
+            Normalisation::Arithmetic => near.divide_by_mean(0, own),
+            Normalisation::Geometric | Normalisation::Sinkhorn => near.multiply(0, own),
         }
+        if self.caps.is_empty() {
+            return 1;
+        }
+        near.limit(1, self.caps[idx]);
+        2
+    }
+
+    /// The weight of a parcel for itself, with the roundings of [`Self::normalise`].
+    #[inline(always)]
+    fn own_weight(&self, force: f64, idx: usize) -> f64 {
+        let own = self.factors[idx];
+        let weight = force
+            * match self.normalisation {
+                Normalisation::Arithmetic => 2.0 / (own + own),
+                Normalisation::Geometric | Normalisation::Sinkhorn => own * own,
+            };
+        if self.caps.is_empty() { weight } else { weight * self.caps[idx] }
     }
 }

@@ -8,9 +8,11 @@
 use crate::plan::exchange::determinant;
 use crate::plan::{Axis, Side};
 
-/// Cells within a radius: across rows, and along them, where ranges are cut closely.
-const ACROSS: f64 = 1.0;
+/// Cells within a radius along rows, where ranges are cut closely; across them they are as wide as a group of so many
+/// parcels, but neither wider than the radius nor narrower than a part of it.
 const ALONG: f64 = 8.0;
+const GROUP: f64 = 8.0;
+const NARROWEST: f64 = 0.3;
 
 /// Added to ranges, over the radius: rounding must not cut off what is just within it.
 const SLACK: f64 = 1e-9;
@@ -39,6 +41,8 @@ pub struct Space<const D: usize> {
     cells: [usize; D],
     /// Number of the last cell.
     last: [f64; D],
+    /// How far parcels that look for neighbours together lie apart at most.
+    pub together: [f64; D],
     reach: f64,
     reach_square: f64,
     slack: f64,
@@ -70,13 +74,14 @@ impl<const D: usize> Space<D> {
             edge: [1.0; D],
             cells: [1; D],
             last: [0.0; D],
+            together: [0.0; D],
             reach: radius * (1.0 + SLACK),
             reach_square: radius * radius,
             slack: radius * SLACK,
             images: Vec::new(),
         };
         space.enclose(axes);
-        space.divide(n_particles, [radius; D]);
+        space.divide(n_particles);
         space.images = space.images_of(axes);
         Some(space)
     }
@@ -95,22 +100,18 @@ impl<const D: usize> Space<D> {
             edge: [1.0; D],
             cells: [1; D],
             last: [0.0; D],
+            together: [0.0; D],
             // Images of the nearest sides are enough: no distance is asked of them.
             reach: 0.0,
             reach_square: 0.0,
             slack: 0.0,
             images: Vec::new(),
         };
-        // A cell is no smaller than the last bits of a place.
+        // Half of a reach across: rows that a kernel touches hold less that is out of reach. A cell is no smaller than the
+        // last bits of a place.
         let least = |axis: usize| 1e-9 * (high(axis) - low(axis));
-        // Half of a reach across: rows that a kernel touches hold less that is out of reach.
-        space.divide(
-            n_particles,
-            std::array::from_fn(|axis| {
-                let part = if axis + 1 == D { 1.0 } else { 0.5 };
-                (part * reach[axis]).max(least(axis))
-            }),
-        );
+        let part = |axis: usize| if axis + 1 == D { 1.0 / ALONG } else { 0.5 };
+        space.cut(n_particles, std::array::from_fn(|axis| (part(axis) * reach[axis]).max(least(axis))));
         space.radius = 0.0;
         space.images = space.images_of(axes);
         space.radius = radius;
@@ -160,10 +161,19 @@ impl<const D: usize> Space<D> {
     }
 
     /// Cells of a part of the radius, not many more than particles.
-    fn divide(&mut self, n_particles: u64, reach: [f64; D]) {
+    fn divide(&mut self, n_particles: u64) {
+        let volume: f64 = (0..D).map(|axis| self.high[axis] - self.low[axis]).product();
+        let wide = crate::maths::scalar::pow(GROUP * volume / n_particles.max(1) as f64, 1.0 / D as f64);
+        let wide = wide.min(self.radius).max(NARROWEST * self.radius);
+        self.together = [wide; D];
+        let mut edge = [wide; D];
+        edge[D - 1] = self.radius / ALONG;
+        self.cut(n_particles, edge);
+    }
+
+    /// Cells of about these edges, wider where they would be more than twice as many as particles.
+    fn cut(&mut self, n_particles: u64, mut edge: [f64; D]) {
         let most = (2 * n_particles.clamp(512, 1 << 30)) as f64;
-        let mut edge: [f64; D] =
-            std::array::from_fn(|axis| reach[axis] / if axis + 1 == D { ALONG } else { ACROSS });
         let lengths: [f64; D] = std::array::from_fn(|axis| self.high[axis] - self.low[axis]);
         for _ in 0..64 {
             let n: f64 = (0..D).map(|axis| (lengths[axis] / edge[axis]).ceil().max(1.0)).product();
@@ -217,13 +227,13 @@ impl<const D: usize> Space<D> {
         cell
     }
 
-    /// Distance along an axis from a place to a cell of it; the first and the last cell have no end.
+    /// Distance along an axis from a range of places to a cell of it; the first and the last cell have no end.
     #[inline(always)]
-    pub fn distance(&self, axis: usize, cell: usize, y: f64) -> f64 {
+    pub fn gap(&self, axis: usize, cell: usize, low: f64, high: f64) -> f64 {
         let cell = cell as f64;
-        let low = self.low[axis] + cell * self.edge[axis];
-        let below = if cell > 0.0 { low - y } else { 0.0 };
-        let above = if cell < self.last[axis] { y - (low + self.edge[axis]) } else { 0.0 };
+        let start = self.low[axis] + cell * self.edge[axis];
+        let below = if cell > 0.0 { start - high } else { 0.0 };
+        let above = if cell < self.last[axis] { low - (start + self.edge[axis]) } else { 0.0 };
         let farther = if below > above { below } else { above };
         if farther > 0.0 { farther } else { 0.0 }
     }
@@ -241,12 +251,13 @@ impl<const D: usize> Space<D> {
         (if rest > 0.0 { rest } else { 0.0 }).sqrt() + self.slack
     }
 
-    /// Images that reach a place; none of those of most.
+    /// Images that reach a box; none of those of most.
     #[inline(always)]
-    pub fn images(&self, y: [f64; D]) -> &[Image<D>] {
+    pub fn images(&self, (low, high): ([f64; D], [f64; D])) -> &[Image<D>] {
         let mut is_inside = true;
         for axis in 0..D {
-            is_inside &= y[axis] - self.low[axis] > self.radius && self.high[axis] - y[axis] > self.radius;
+            is_inside &=
+                low[axis] - self.low[axis] > self.radius && self.high[axis] - high[axis] > self.radius;
         }
         // In a sheared box the corners hide the sides.
         if is_inside && !self.is_sheared() { &[] } else { &self.images }
@@ -256,19 +267,19 @@ impl<const D: usize> Space<D> {
         (0..D).any(|row| (row + 1..D).any(|column| self.rows[row][column] != 0.0))
     }
 
-    /// Whether anything of the domain may be within the radius of a place.
+    /// Whether anything of the domain may be within the radius of a box.
     #[inline(always)]
-    pub fn is_near(&self, y: [f64; D]) -> bool {
+    pub fn is_near(&self, (low, high): ([f64; D], [f64; D])) -> bool {
         let mut is_near = true;
         for axis in 0..D {
-            is_near &= y[axis] > self.low[axis] - self.radius && y[axis] < self.high[axis] + self.radius;
+            is_near &= high[axis] > self.low[axis] - self.radius && low[axis] < self.high[axis] + self.radius;
         }
         is_near
     }
 
     /// All combinations of the images of single axes.
     fn images_of(&self, axes: &[Axis]) -> Vec<Image<D>> {
-        let still = Image { sign: [1.0; D], shift: [0.0; D] };
+        let still = Image::NONE;
         let mut all = vec![still];
         for (axis, own) in axes.iter().enumerate() {
             let is_coupled = (0..D).any(|other| {
@@ -325,11 +336,27 @@ impl<const D: usize> Space<D> {
 }
 
 impl<const D: usize> Image<D> {
+    /// What is where it is.
+    pub const NONE: Self = Self { sign: [1.0; D], shift: [0.0; D] };
+
+    /// Where a place appears.
     #[inline(always)]
     pub fn of(&self, y: [f64; D]) -> [f64; D] {
         let mut image = y;
         for axis in 0..D {
             image[axis] = self.sign[axis] * y[axis] + self.shift[axis];
+        }
+        image
+    }
+
+    /// The box in which a box appears.
+    #[inline(always)]
+    pub fn of_box(&self, (low, high): ([f64; D], [f64; D])) -> ([f64; D], [f64; D]) {
+        let mut image = (low, high);
+        for axis in 0..D {
+            let low = self.sign[axis] * low[axis] + self.shift[axis];
+            let high = self.sign[axis] * high[axis] + self.shift[axis];
+            (image.0[axis], image.1[axis]) = if low < high { (low, high) } else { (high, low) };
         }
         image
     }
