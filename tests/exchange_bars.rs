@@ -157,14 +157,13 @@ fn what_a_cut_off_takes_is_what_the_theory_says() {
     for (a, row) in [3.0, 4.0, 5.0, 6.0].into_iter().zip(TABLE) {
         for (d, printed) in (1..=3).zip(row) {
             // Where the edge of a kernel lies among ordered parcels is chance: between two of them on a line, and a mean
-            // over some bandwidths else.
-            let between = [((24.0_f64 * a).floor() + 0.5) / a];
-            let in_plane = [7.3, 7.7, 8.1, 8.6, 9.0, 9.4].map(|h| h * 4.5 / a);
-            let in_space = [10.8, 11.3, 12.0, 12.5, 13.3, 13.9].map(|reach| reach / a);
-            let per_bandwidths: &[f64] = match d {
-                1 => &between,
-                2 => &in_plane,
-                _ => &in_space,
+            // over two of their distances else, which leaves less than a percent of it.
+            let between = vec![((24.0_f64 * a).floor() + 0.5) / a];
+            let spread = |least: f64| (0..9).map(|k| (least + 0.25 * f64::from(k)) / a).collect();
+            let per_bandwidths: Vec<f64> = match d {
+                1 => between,
+                2 => spread(16.1),
+                _ => spread(7.1),
             };
             let found = per_bandwidths.iter().map(|&per_bandwidth| {
                 1.0 - growth(d, per_bandwidth, |exchange| {
@@ -175,7 +174,7 @@ fn what_a_cut_off_takes_is_what_the_theory_says() {
             let theory = lost_by_the_cut(d, a);
             tell(&format!("a = {a}, {d}-D: {found:.4e}, theory {theory:.4e}, table {printed:e}"));
             assert!((theory / printed - 1.0).abs() < 0.06, "the table is rounded to one to three digits");
-            assert!((found / theory - 1.0).abs() < [0.02, 0.04, 0.08][d - 1]);
+            assert!((found / theory - 1.0).abs() < 0.02);
         }
     }
 }
@@ -218,7 +217,8 @@ fn normalisations_stand_in_the_order_of_their_errors() {
     let of = |n: u64, normalisation: Normalisation| {
         let square = |seed: u64| {
             let mut exchange = gaussian(vec![1.0], times_collocation(1.0));
-            exchange.normalisation = normalisation;
+            // Beyond four bandwidths there is a ten thousandth of the kernel; the errors are a tenth and more.
+            (exchange.normalisation, exchange.cutoff) = (normalisation, Cutoff::Radius(4.0));
             let mut plan = study(n, 0.125, exchange, 0.0);
             (plan.particles.placement, plan.seed) = (Placement::Random, seed);
             error(&plan).powi(2)
@@ -312,13 +312,14 @@ fn entropy_of_a_point_grows_with_the_logarithm_of_time() {
 fn the_same_bytes_however_work_is_divided() {
     for normalisation in NORMALISATIONS {
         for integration in INTEGRATIONS {
-            let mut exchange = gaussian(identity(2), support::constant(0.006));
+            // Ten thousand parcels are many blocks and portions for every one of seven threads.
+            let mut exchange = gaussian(identity(2), support::constant(0.0085));
             (exchange.normalisation, exchange.integration) = (normalisation, integration);
-            let mut plan = cloud(&[Side::Reflect, Side::Periodic], 20_000, exchange, 1.5e-5);
+            let mut plan = cloud(&[Side::Reflect, Side::Periodic], 10_000, exchange, 3e-5);
             plan.walk = support::walk(2, 0.5);
             plan.stages = vec![Stage::Move, Stage::Bound, Stage::Exchange, Stage::Observe];
-            (plan.time.n_steps, plan.time.duration) = (2, 3e-5);
-            plan.outputs = vec![support::all_particles(&plan, vec![0.0, 3e-5])];
+            (plan.time.n_steps, plan.time.duration) = (2, 6e-5);
+            plan.outputs = vec![support::all_particles(&plan, vec![0.0, 6e-5])];
             let of = |threads: usize, is_narrow: bool| {
                 let settings = Settings { threads: Some(threads), is_narrow, ..Settings::default() };
                 before_and_after(&plan, &settings)

@@ -10,7 +10,8 @@ const LINE: &str = include_str!("../experiments/exchange_point/line.lam");
 const PLANE: &str = include_str!("../experiments/exchange_point/plane.lam");
 const CUTOFF: &str = include_str!("../experiments/exchange_theory/cutoff.lam");
 const STEP_LINE: &str = include_str!("../experiments/exchange_heaviside/line.lam");
-const STUDY: &str = include_str!("../experiments/kernel_size_study/kernel_size_study.lam");
+const STUDY: &str = include_str!("../experiments/kernel_size_study/line.lam");
+const STUDY_PLANE: &str = include_str!("../experiments/kernel_size_study/plane.lam");
 const BOTH: &str = include_str!("../experiments/exchange_work_precision/exchange_work_precision.lam");
 
 fn with(text: &str, set: &[(&str, &str)], seed: u64) -> Finished {
@@ -81,6 +82,24 @@ fn the_best_kernel_size_moves_with_disorder_and_density() {
     assert!(resting[1] < 0.7 * resting[0]);
     assert!(walking[1] > 1.3 * walking[0]);
     assert!(ordered[0] < 1e-6 && ordered[1] > 1e-3);
+}
+
+/// The same in a plane: parcels at rest in disorder, one to a collocation length, want wider kernels; two of them that walk
+/// want none wider; ordered ones are exact at the collocation length and at no other.
+#[test]
+fn the_best_kernel_size_moves_in_a_plane_as_on_a_line() {
+    let error = |per_axis: &str, part: &str, disorder: &str, ratio: &str| {
+        let sizes = [("step", "0.125s"), ("per_axis", per_axis), ("ratio", ratio)];
+        let set: Vec<_> = sizes.into_iter().chain([("part", part), ("disorder", disorder)]).collect();
+        of_seeds(STUDY_PLANE, &set, "err")
+    };
+    let resting = [error("48", "1", "100", "1"), error("48", "1", "100", "1.5")];
+    let walking = [error("96", "0.5", "100", "1"), error("96", "0.5", "100", "2")];
+    let ordered = [error("48", "1", "0", "1"), error("48", "1", "0", "1.5")];
+    tell(&format!("resting {resting:.3?}, walking {walking:.3?}, ordered {ordered:?}"));
+    assert!(resting[1] < 0.8 * resting[0]);
+    assert!(walking[1] > 1.5 * walking[0]);
+    assert!(ordered[0] < 1e-5 && ordered[1] > 1e-2);
 }
 
 /// One statement is a walk, an exchange, or both: nothing is lost, and all come to the plume, walking parcels only as fast as

@@ -14,6 +14,9 @@ use lamella::scenario::Settings;
 use lamella::source::Sources;
 use std::path::Path;
 
+/// Particles of a run at most: ten blocks of them.
+const PARTICLES: u64 = 10_000;
+
 /// A scene with few particles and few steps: the proof needs no accuracy.
 fn small(text: &str) -> String {
     let mut lines = Vec::new();
@@ -46,9 +49,10 @@ fn compile_in(folder: &Path, text: &str, passes: Selection) -> (Compiled, Option
     (checked.compiled.unwrap_or_else(|| panic!("no plan: {:#?}", checked.diagnostics)), flow)
 }
 
-/// The snapshots of the first steps.
-fn run((compiled, flow): &(Compiled, Option<FlowSeries>)) -> Vec<Snapshot> {
+/// The snapshots of the first steps, of one particle in so many.
+fn run((compiled, flow): &(Compiled, Option<FlowSeries>), one_in: u64) -> Vec<Snapshot> {
     let mut plan = compiled.plan.clone();
+    plan.set_count((plan.particles.count / one_in).max(1));
     plan.time.n_steps = plan.time.n_steps.min(30);
     plan.time.duration = plan.time.duration.min(30.0 * plan.time.step);
     let end = plan.time.duration;
@@ -141,14 +145,27 @@ fn scenes() -> Vec<(String, String)> {
     scenes
 }
 
-#[test]
-fn passes_that_drop_and_fuse_keep_every_bit() {
+/// Holds all scenes, each with two choices of passes, to the same results; the number of scenes whose plans differ. The
+/// engine sees the plan and nothing else, so that of equal plans nothing is learnt by running them.
+fn hold(literal: Selection, lean: Selection, tolerance: f64) -> usize {
+    let mut n_differing = 0;
     for (name, text) in scenes() {
         let (text, folder) = (small(&text), Path::new(&name).parent().expect("a folder"));
-        let literal = run(&compile_in(folder, &text, Selection::None));
-        let lean = run(&compile_in(folder, &text, Selection::KeepingBytes));
-        assert_same(&literal, &lean, 0.0, &name);
+        let literal = compile_in(folder, &text, literal);
+        let lean = compile_in(folder, &text, lean);
+        if literal.0.plan == lean.0.plan || literal.0.plan.axes.len() != lean.0.plan.axes.len() {
+            continue;
+        }
+        n_differing += 1;
+        let one_in = literal.0.plan.particles.count.div_ceil(PARTICLES);
+        assert_same(&run(&literal, one_in), &run(&lean, one_in), tolerance, &name);
     }
+    n_differing
+}
+
+#[test]
+fn passes_that_drop_and_fuse_keep_every_bit() {
+    assert!(hold(Selection::None, Selection::KeepingBytes, 0.0) >= 40);
 }
 
 /// A conservation relation replaces a carried field by `α + β U`: one rounding at output instead of
@@ -156,15 +173,7 @@ fn passes_that_drop_and_fuse_keep_every_bit() {
 /// nearly equal numbers and keep three figures less.
 #[test]
 fn passes_that_replace_arithmetic_change_the_last_bits_only() {
-    for (name, text) in scenes() {
-        let (text, folder) = (small(&text), Path::new(&name).parent().expect("a folder"));
-        let literal = compile_in(folder, &text, Selection::KeepingBytes);
-        let lean = compile_in(folder, &text, Selection::All);
-        if literal.0.plan.axes.len() != lean.0.plan.axes.len() {
-            continue;
-        }
-        assert_same(&run(&literal), &run(&lean), 1e-10, &name);
-    }
+    assert!(hold(Selection::KeepingBytes, Selection::All, 1e-10) >= 8);
 }
 
 /// The Gramling column with things that nothing reads: species, a reaction and functions, an output that

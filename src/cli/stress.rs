@@ -63,6 +63,8 @@ enum KnobName {
     Step,
     /// The bandwidth of an exchange
     Bandwidth,
+    /// The dispersion by exchange
+    Exchange,
 }
 
 impl From<KnobName> for Knob {
@@ -76,6 +78,7 @@ impl From<KnobName> for Knob {
             KnobName::Damkohler => Self::Damkohler,
             KnobName::Step => Self::Step,
             KnobName::Bandwidth => Self::Bandwidth,
+            KnobName::Exchange => Self::Exchange,
         }
     }
 }
@@ -208,7 +211,12 @@ fn text(rows: &[StressRow], wall: f64, terminal: &Terminal) -> Result<String, St
     let lines: Vec<Vec<String>> = rows.iter().map(line).collect();
     let count = |fate: Fate| rows.iter().filter(|row| row.fate == fate.name()).count();
     // Never, and so not worth a word where there are none.
-    let wrong: String = [(Fate::MassLost, "lost mass"), (Fate::Negative, "below zero")]
+    let never = [
+        (Fate::MassLost, "lost mass"),
+        (Fate::Negative, "below zero"),
+        (Fate::Beyond, "beyond their bounds"),
+    ];
+    let wrong: String = never
         .into_iter()
         .map(|(fate, word)| (count(fate), word))
         .filter(|(n, _)| *n > 0)

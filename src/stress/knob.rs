@@ -29,10 +29,12 @@ pub enum Knob {
     Step,
     /// The bandwidth of an exchange.
     Bandwidth,
+    /// The dispersion by exchange, and with it the share of a step; what walks stays.
+    Exchange,
 }
 
 impl Knob {
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Rates,
         Self::Concentrations,
         Self::HalfSaturation,
@@ -41,6 +43,7 @@ impl Knob {
         Self::Damkohler,
         Self::Step,
         Self::Bandwidth,
+        Self::Exchange,
     ];
 
     /// As it is written on the command line and in tables.
@@ -54,6 +57,7 @@ impl Knob {
             Self::Damkohler => "damkohler",
             Self::Step => "step",
             Self::Bandwidth => "bandwidth",
+            Self::Exchange => "exchange",
         }
     }
 
@@ -81,7 +85,7 @@ impl Knob {
                 (kinetics.is_some() || equilibrium.is_some()) && (is_moving || exchanges(plan))
             }
             Self::Step => true,
-            Self::Bandwidth => plan.exchange.is_some(),
+            Self::Bandwidth | Self::Exchange => plan.exchange.is_some(),
         }
     }
 
@@ -129,6 +133,7 @@ impl Knob {
             Self::Bandwidth => {
                 plan.exchange.iter_mut().for_each(|exchange| exchange.bandwidth.scale(factor));
             }
+            Self::Exchange => divide_exchange(plan, 1.0 / factor),
         }
     }
 }

@@ -7,8 +7,8 @@ use crate::diagnostic::{Diagnostic, Severity};
 use crate::engine::snapshot::{Outcome, Snapshot, Values};
 use crate::engine::{Control, RunError, Settings, run};
 use crate::flow::FlowSeries;
-use crate::plan::Plan;
 use crate::plan::compile::{Compiled, Options, compile_edited};
+use crate::plan::{Output, OutputKind, Plan, Quantity};
 use crate::scenario::Scenario;
 use crate::stop;
 use std::time::{Duration, Instant};
@@ -21,6 +21,9 @@ const TIGHTEST: f64 = 1e-13;
 
 /// Without a tolerance: what is below zero by this share of the largest value is no rounding.
 const LEAST: f64 = 1e-9;
+
+/// Beyond the values at the start by this share of the largest one: more than rounding.
+const BEYOND: f64 = 1e-12;
 
 /// How much a trial may take.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,6 +55,8 @@ pub enum Fate {
     MassLost,
     /// Something was below zero by more than the tolerance.
     Negative,
+    /// Something was above or below all that there was at the start, though parcels only exchanged it.
+    Beyond,
     /// Not run, or cut short, for its time.
     TooLong,
 }
@@ -64,6 +69,7 @@ impl Fate {
             Self::Stopped => "stopped",
             Self::MassLost => "mass_lost",
             Self::Negative => "negative",
+            Self::Beyond => "beyond",
             Self::TooLong => "too_long",
         }
     }
@@ -166,7 +172,8 @@ impl Verdict {
 
     fn take(&mut self, scenario: &Scenario, compiled: &Compiled, bounds: &Bounds) {
         let begin = Instant::now();
-        let result = finish(&compiled.plan, bounds);
+        let watched = is_bounded(&compiled.plan).then(|| watched(&compiled.plan));
+        let result = finish(watched.as_ref().unwrap_or(&compiled.plan), bounds);
         self.wall = begin.elapsed().as_secs_f64();
         let (outcome, snapshots) = match result {
             Ok(finished) => finished,
@@ -195,8 +202,49 @@ impl Verdict {
             self.fate = Fate::Negative;
             self.reason = Some("a concentration that is shown is below zero".to_owned());
         }
+        if let Some(reason) = watched.and_then(|plan| beyond(&snapshots, plan.outputs.len() - 1)) {
+            self.fate = Fate::Beyond;
+            self.reason = Some(reason);
+        }
         self.error = tolerance_error(&compiled.plan, &snapshots, bounds);
     }
+}
+
+/// Whether values stay between those at the start: parcels exchange, and nothing else makes, brings or mixes any.
+fn is_bounded(plan: &Plan) -> bool {
+    plan.exchange.is_some() && plan.chemistry.is_none() && plan.transport.is_none() && plan.mixing.is_none()
+}
+
+/// With all parcels looked at, at the start and in the end.
+fn watched(plan: &Plan) -> Plan {
+    let mut plan = plan.clone();
+    plan.outputs.push(Output {
+        kind: OutputKind::Particles,
+        quantities: (0..plan.species.len()).map(Quantity::Species).collect(),
+        bins: Vec::new(),
+        times: vec![0.0, plan.time.duration],
+        unit: None,
+        station: None,
+    });
+    plan
+}
+
+/// The first value of an output that lies beyond those of its species at the start, or is no number.
+fn beyond(snapshots: &[Snapshot], output_idx: usize) -> Option<String> {
+    let mut seen = snapshots.iter().filter(|snapshot| snapshot.output_idx == output_idx);
+    let columns = |snapshot: &'_ Snapshot| match &snapshot.values {
+        Values::Particles { concentrations, .. } => concentrations.clone(),
+        _ => Vec::new(),
+    };
+    let (start, end) = (columns(seen.next()?), columns(seen.next_back()?));
+    start.iter().zip(&end).find_map(|(start, end)| {
+        let low = start.iter().copied().fold(f64::INFINITY, f64::min);
+        let high = start.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let slack = BEYOND * low.abs().max(high.abs());
+        let is_inside = |value: f64| value >= low - slack && value <= high + slack;
+        let wrong = end.iter().copied().find(|&value| !is_inside(value))?;
+        Some(format!("a parcel has {wrong:e}, where there were {low:e} to {high:e} at the start (SI)"))
+    })
 }
 
 /// Stops a run at its deadline.
@@ -253,4 +301,25 @@ fn tolerance_error(plan: &Plan, snapshots: &[Snapshot], bounds: &Bounds) -> Opti
         size += other * other;
     }
     (size > 0.0).then(|| (difference / size).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn seen(output_idx: usize, values: &[f64]) -> Snapshot {
+        let values =
+            Values::Particles { positions: vec![vec![0.0; 3]], concentrations: vec![values.to_vec()] };
+        Snapshot { output_idx, t: 0.0, values }
+    }
+
+    #[test]
+    fn what_lies_beyond_the_start_or_is_no_number_is_found() {
+        let after = |end: &[f64]| beyond(&[seen(1, &[1.0, 1.5, 2.0]), seen(0, &[9.0; 3]), seen(1, end)], 1);
+        assert_eq!(after(&[2.0, 1.0, 1.0]), None);
+        assert_eq!(after(&[2.0 + 1e-12, 1.0, 1.0]), None);
+        assert!(after(&[2.0 + 1e-11, 1.0, 1.0]).is_some());
+        assert!(after(&[1.0, 0.999, 1.0]).is_some());
+        assert!(after(&[1.0, 1.0, f64::NAN]).is_some());
+    }
 }

@@ -45,7 +45,7 @@ fn columns() -> Vec<Column> {
     vec![
         plain("knob", word(), "what was multiplied"),
         plain("decades", DataType::Int32, "power of ten by which it was multiplied"),
-        plain("fate", word(), "finished, refused, stopped, mass_lost, negative or too_long"),
+        plain("fate", word(), "finished, refused, stopped, mass_lost, negative, beyond or too_long"),
         plain("code", word(), "code of the message that refused it").or_null(),
         plain("line", DataType::UInt32, "line of the scene that the message names, from 1").or_null(),
         plain("message", word(), "why it was refused, stopped or not run").or_null(),

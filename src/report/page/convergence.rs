@@ -7,11 +7,11 @@ use super::super::color::{FAINT, INK};
 use super::super::figure::sheet;
 use super::super::panel::{KeyEntry, Look, Mark};
 use super::super::sweep::{ExpectedOrder, SweepDescription, SweepReport};
-use super::along::{places, points_csv};
+use super::along::{self, Drawn, places};
 use super::csv::{Csv, number};
 use super::html::{escape, figure, paragraph, table};
 use super::quantity::{self, interval, label, shown};
-use super::series::{self, Series, color, key_entry, log_panel, marker, slug};
+use super::series::{self, Series, color, key_entry, log_panel, marker};
 use super::stats::{Slope, fit};
 use super::study::Study;
 use crate::maths::scalar::{exp, ln};
@@ -38,29 +38,14 @@ pub fn convergence(
     sweep: &SweepDescription,
     report: &SweepReport,
 ) -> (String, Vec<(String, String)>) {
-    let mut body = String::new();
-    let mut files = Vec::new();
-    let Some(column) = study.column(&report.measure) else {
-        return (paragraph(&format!("points.parquet has no column `{}`.", report.measure)), files);
-    };
-    for against in &report.against {
-        let Some(axis) = study.axis(against) else {
-            body += &paragraph(&format!("points.parquet has no column for the axis `{against}`."));
-            continue;
-        };
+    along::against(study, report, "convergence", |column, axis| {
         let orders = sweep.expectations.iter().filter_map(|expectation| expectation.order.as_ref());
-        let is_mine = |order: &&ExpectedOrder| order.measure == report.measure && order.axis == *against;
-        let expected = orders.into_iter().find(is_mine);
-        let course = Course::new(study, &report.measure, column, axis, expected);
-        body += &course.html();
-        let stem = format!("{}-{}", slug(&report.measure), slug(against));
-        files.push((
-            format!("convergence-{stem}.csv"),
-            points_csv(study, &report.measure, column, &course.groups),
-        ));
-        files.push((format!("orders-{stem}.csv"), course.orders_csv()));
-    }
-    (body, files)
+        let name = &study.axes[axis].name;
+        let is_mine = |order: &&ExpectedOrder| order.measure == report.measure && order.axis == *name;
+        let course = Course::new(study, &report.measure, column, axis, orders.into_iter().find(is_mine));
+        let (html, table) = (course.html(), ("orders", course.orders_csv()));
+        Drawn { html, groups: course.groups, table }
+    })
 }
 
 impl<'a> Course<'a> {
@@ -71,12 +56,7 @@ impl<'a> Course<'a> {
         axis: usize,
         expected: Option<&'a ExpectedOrder>,
     ) -> Self {
-        // All that varies besides, or a slope would mix points of different physics.
-        let is_other = |idx: &usize| study.axes[*idx].group != study.axes[axis].group;
-        let others: Vec<usize> = (0..study.axes.len()).filter(is_other).collect();
-        let mut groups = series::series(study, &others);
-        let place = |point: &super::study::PointSummary| point.axes[axis].unwrap_or(f64::NAN);
-        groups.iter_mut().for_each(|group| group.points.sort_by(|a, b| place(a.1).total_cmp(&place(b.1))));
+        let groups = along::courses(study, axis);
         let logs: Vec<Vec<(f64, f64)>> = groups
             .iter()
             .map(|group| places(group, axis, column).map(|(x, y)| (ln(x), ln(y.mean))).collect())

@@ -7,13 +7,13 @@ use super::super::color::INK;
 use super::super::figure::sheet;
 use super::super::panel::{Look, Mark, Shape};
 use super::super::sweep::SweepReport;
-use super::along::{places, points_csv};
+use super::along::{self, Drawn, places};
 use super::csv::{Csv, number};
 use super::html::{escape, figure, paragraph, table};
 use super::quantity::{label, shown, with_unit};
-use super::series::{self, Series, color, key_entry, log_panel, marker, slug};
+use super::series::{self, Series, color, key_entry, log_panel, marker};
 use super::stats::Moments;
-use super::study::{PointSummary, Study};
+use super::study::Study;
 use crate::maths::scalar::{exp, ln};
 
 /// Series whose minima are listed on the page.
@@ -49,35 +49,17 @@ struct Valley<'a> {
 
 /// The body of a section, and its tables.
 pub fn minimum(study: &Study, report: &SweepReport) -> (String, Vec<(String, String)>) {
-    let (mut body, mut files) = (String::new(), Vec::new());
-    let Some(column) = study.column(&report.measure) else {
-        return (paragraph(&format!("points.parquet has no column `{}`.", report.measure)), files);
-    };
-    for against in &report.against {
-        let Some(axis) = study.axis(against) else {
-            body += &paragraph(&format!("points.parquet has no column for the axis `{against}`."));
-            continue;
-        };
-        let by: Vec<usize> = report.by.iter().filter_map(|name| study.axis(name)).collect();
+    let by: Vec<usize> = report.by.iter().filter_map(|name| study.axis(name)).collect();
+    along::against(study, report, "minimum", |column, axis| {
         let valley = Valley::new(study, &report.measure, column, axis);
-        body += &valley.html(&by);
-        let stem = format!("{}-{}", slug(&report.measure), slug(against));
-        files.push((
-            format!("minimum-{stem}.csv"),
-            points_csv(study, &report.measure, column, &valley.groups),
-        ));
-        files.push((format!("minima-{stem}.csv"), valley.minima_csv()));
-    }
-    (body, files)
+        let (html, table) = (valley.html(&by), ("minima", valley.minima_csv()));
+        Drawn { html, groups: valley.groups, table }
+    })
 }
 
 impl<'a> Valley<'a> {
     fn new(study: &'a Study, measure: &'a str, column: usize, axis: usize) -> Self {
-        let is_other = |idx: &usize| study.axes[*idx].group != study.axes[axis].group;
-        let others: Vec<usize> = (0..study.axes.len()).filter(is_other).collect();
-        let mut groups = series::series(study, &others);
-        let place = |point: &PointSummary| point.axes[axis].unwrap_or(f64::NAN);
-        groups.iter_mut().for_each(|group| group.points.sort_by(|a, b| place(a.1).total_cmp(&place(b.1))));
+        let groups = along::courses(study, axis);
         let least =
             groups.iter().map(|group| least(&places(group, axis, column).collect::<Vec<_>>())).collect();
         Self { study, measure, column, axis, groups, least }
