@@ -38,6 +38,10 @@ fn plan(d: usize, n: u64, kernel: &str, neighbours: f64, walks: bool) -> Plan {
         normalisation: Normalisation::Arithmetic,
         integration: Integration::Explicit,
     });
+    // The same share for all kernels: above one, weights are cut down in a sum of its own.
+    let share = plan.exchange.as_ref().map_or(1.0, |exchange| exchange.sizes(&plan, dt).share);
+    plan.time.step = dt * 0.25 / share;
+    plan.time.duration = n_steps as f64 * plan.time.step;
     if walks {
         plan.walk = support::walk(d, 1e-3);
         plan.stages = vec![Stage::Move, Stage::Bound, Stage::Exchange];
