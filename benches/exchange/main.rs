@@ -91,16 +91,22 @@ fn compare<const D: usize>(neighbours: f64) {
     }
 }
 
-fn compare_all() {
-    compare::<2>(30.0);
-    compare::<2>(113.0);
-    compare::<3>(30.0);
-    compare::<3>(113.0);
+/// In a plane, in space.
+fn compare_all(in_plane: bool, in_space: bool) {
+    for neighbours in [30.0, 113.0] {
+        if in_plane {
+            compare::<2>(neighbours);
+        }
+        if in_space {
+            compare::<3>(neighbours);
+        }
+    }
 }
 
 fn main() {
-    compare_all();
-    if std::env::args().any(|argument| argument == "floor") {
+    let has = |word: &str| std::env::args().any(|argument| argument == word);
+    compare_all(!has("space"), !has("plane"));
+    if has("space") || has("plane") {
         return;
     }
     for d in 1..=3 {
