@@ -39,6 +39,10 @@ fn plan(d: usize, n: u64, kernel: &str, neighbours: f64, walks: bool) -> Plan {
         normalisation: Normalisation::Arithmetic,
         integration: Integration::Explicit,
     });
+    // The same share for all kernels: above one, weights are cut down in a sum of its own.
+    let share = plan.exchange.as_ref().map_or(1.0, |exchange| exchange.sizes(&plan, dt).share);
+    plan.time.step = dt * 0.25 / share;
+    plan.time.duration = n_steps as f64 * plan.time.step;
     if walks {
         plan.walk = support::walk(d, 1e-3);
         plan.stages = vec![Stage::Move, Stage::Bound, Stage::Exchange];
@@ -88,16 +92,22 @@ fn compare<const D: usize>(neighbours: f64) {
     }
 }
 
-fn compare_all() {
-    compare::<2>(30.0);
-    compare::<2>(113.0);
-    compare::<3>(30.0);
-    compare::<3>(113.0);
+/// In a plane, in space.
+fn compare_all(in_plane: bool, in_space: bool) {
+    for neighbours in [30.0, 113.0] {
+        if in_plane {
+            compare::<2>(neighbours);
+        }
+        if in_space {
+            compare::<3>(neighbours);
+        }
+    }
 }
 
 fn main() {
-    compare_all();
-    if std::env::args().any(|argument| argument == "floor") {
+    let has = |word: &str| std::env::args().any(|argument| argument == word);
+    compare_all(!has("space"), !has("plane"));
+    if has("space") || has("plane") {
         return;
     }
     for d in 1..=3 {

@@ -17,14 +17,16 @@ mod table {
     pub(super) const BOUND: f64 = 0.5;
     /// Sum of one value and count of one particle.
     pub(super) const AVERAGE: f64 = 0.9;
-    /// One parcel put in the order of cells, and its values brought there and back.
+    /// One parcel put in the order of cells, and its values brought there and back; and where it is found at rest.
     pub(super) const SORT: f64 = 50.0;
-    /// One parcel among its neighbours, and one of them: weighed, and one of its values.
-    pub(super) const PARCEL: f64 = 40.0;
-    pub(super) const PAIR: f64 = 2.5;
-    pub(super) const PAIR_VALUE: f64 = 0.5;
+    pub(super) const STAND: f64 = 25.0;
+    /// One parcel among its neighbours, and one of them weighed, with one, two and three axes: more dimensions have more
+    /// that is sifted for each that is near. And one value of a neighbour.
+    pub(super) const PARCEL: [f64; 3] = [60.0, 110.0, 200.0];
+    pub(super) const PAIR: [f64; 3] = [3.5, 4.2, 7.4];
+    pub(super) const PAIR_VALUE: f64 = 0.6;
     /// Neighbours where each parcel has a kernel of its own: more of them are looked at.
-    pub(super) const OWN_KERNELS: f64 = 4.0;
+    pub(super) const OWN_KERNELS: f64 = 2.5;
     /// Relaxation of one stored value.
     pub(super) const MIX: f64 = 0.7;
     /// One reaction of a particle in closed form, with reading and writing it.
@@ -162,13 +164,19 @@ fn own_values(plan: &Plan, n_values: f64) -> f64 {
     exchanged + f64::from(u8::from(plan.transport.is_some()))
 }
 
-/// Nanoseconds per particle and step of an exchange: neighbours are looked for and weighed twice in each sum.
+/// Nanoseconds per particle and step of an exchange. Parcels at rest are sorted, and their weights made, once in a run.
 fn exchange_cost(plan: &Plan, n_values: f64) -> f64 {
     let Some(exchange) = &plan.exchange else { return 0.0 };
     let sizes = exchange.sizes(plan, plan.time.step);
-    let sums = exchange.sums(sizes.share);
-    let looked_at = if exchange.spreading.is_some() { table::OWN_KERNELS } else { 1.0 } * sizes.neighbours;
-    table::SORT + sums * (table::PARCEL + looked_at * (table::PAIR + table::PAIR_VALUE * n_values))
+    let (weights, applied) = exchange.sums(sizes.share);
+    let axis = plan.axes.len().clamp(1, 3) - 1;
+    let has_own = exchange.spreading.is_some();
+    let looked_at = if has_own { table::OWN_KERNELS } else { 1.0 } * sizes.neighbours;
+    let sum = table::PARCEL[axis] + looked_at * (table::PAIR[axis] + table::PAIR_VALUE * n_values);
+    let anew = table::SORT + weights * sum;
+    let walks = has_own || plan.stages.iter().any(|stage| matches!(stage, Stage::Move | Stage::FusedStep));
+    let prepared = if walks { anew } else { table::STAND + anew / plan.time.n_steps.max(1) as f64 };
+    prepared + applied * sum
 }
 
 /// Nanoseconds per particle and step of a walk along tracks.

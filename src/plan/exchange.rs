@@ -152,8 +152,9 @@ impl Exchange {
         require(radius.is_finite() && radius > 0.0, || "a kernel that ends nowhere".into())
     }
 
-    /// Sums over neighbours in a step that exchanges this share, about.
-    pub fn sums(&self, share: f64) -> f64 {
+    /// Sums over neighbours, about: those that make the weights of parcels as they stand, and those of a step that exchanges
+    /// this share.
+    pub fn sums(&self, share: f64) -> (f64, f64) {
         let weights = match self.normalisation {
             Normalisation::Arithmetic | Normalisation::Geometric => 1.0,
             Normalisation::Sinkhorn => 20.0,
@@ -163,7 +164,7 @@ impl Exchange {
             Integration::Implicit => 5.0 + 15.0 * share.sqrt(),
             Integration::Exponential => 15.0 + share + 8.0 * share.sqrt(),
         };
-        weights + applied
+        (weights, applied)
     }
 
     /// The geometric mean of the principal dispersions, m²/s.

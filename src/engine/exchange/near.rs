@@ -3,7 +3,7 @@
 //! Owns the search through cells and the sums over what is found. May use kernels and the space. It deliberately
 //! writes to nothing but its own lists: every parcel gathers for itself, so that sums never hang on threads.
 //!
-//! What may be near any of the parcels of a group is copied together once. Each of them then sifts it, sixty-four at a
+//! What may be near any of the parcels of a group is copied together once. Each of them then sifts it, thirty-two at a
 //! time, and works with what is left.
 
 #![allow(clippy::needless_range_loop)] // Zipped iterators are not always inlined; these loops are hot.
@@ -62,7 +62,7 @@ pub struct Near<const D: usize> {
     /// Candidates: places, and what else they have.
     places: [[f64; ROOM]; D],
     carried: Vec<[f64; ROOM]>,
-    /// Theirs, and what is missing in the last sixty-four.
+    /// Theirs, and what is missing in the last thirty-two.
     n: usize,
     /// Squared distances of the candidates from one parcel, and which of them are near.
     squares: [f64; ROOM],
@@ -236,18 +236,24 @@ impl<const D: usize> Near<D> {
         let (squares, _) = self.squares[..self.n].as_chunks_mut::<SIFTED>();
         let mut n = 0;
         for block in 0..squares.len() {
+            // Of known length, so that nothing is checked within the loop.
+            let mut places = [&[0.0; SIFTED]; D];
+            for axis in 0..D {
+                places[axis] = &columns[axis][block];
+            }
+            let squares = &mut squares[block];
             // One loop each: nested ones are vectorised across pieces.
             for at in 0..SIFTED {
                 let mut sum = 0.0;
                 for axis in 0..D {
-                    let d = columns[axis][block][at] - y[axis];
+                    let d = places[axis][at] - y[axis];
                     sum += d * d;
                 }
-                squares[block][at] = sum;
+                squares[at] = sum;
             }
             let mut mask = 0_u32;
             for at in 0..SIFTED {
-                mask |= if squares[block][at] < square { 1 << at } else { 0 };
+                mask |= if squares[at] < square { 1 << at } else { 0 };
             }
             for piece in 0..SIFTED / LANES {
                 let bits = (mask >> (piece * LANES)) as u8;
