@@ -10,6 +10,7 @@ const LINE: &str = include_str!("../experiments/exchange_point/line.lam");
 const PLANE: &str = include_str!("../experiments/exchange_point/plane.lam");
 const CUTOFF: &str = include_str!("../experiments/exchange_theory/cutoff.lam");
 const STEP_LINE: &str = include_str!("../experiments/exchange_heaviside/line.lam");
+const STEP_PLANE: &str = include_str!("../experiments/exchange_heaviside/plane.lam");
 const STUDY: &str = include_str!("../experiments/kernel_size_study/line.lam");
 const STUDY_PLANE: &str = include_str!("../experiments/kernel_size_study/plane.lam");
 const BOTH: &str = include_str!("../experiments/exchange_work_precision/exchange_work_precision.lam");
@@ -65,6 +66,9 @@ fn a_step_front_needs_kernels_that_reach_the_next_parcel() {
     let error = |long: &str| with(STEP_LINE, &[("long", long)], 1).measure("err");
     let (below, at, above) = (error("0.1"), error("1"), error("4"));
     assert!(below > 0.03 && at < 1e-3 && above < 1e-3);
+    let error =
+        |long: &str| with(STEP_PLANE, &[("n", "51"), ("Dy", "0.2m^2/s"), ("long", long)], 1).measure("err");
+    assert!(error("0.2") > 0.02 && error("1") < 5e-4);
 }
 
 /// P4-b: at 0.25 of the collocation length parcels at rest in disorder want wider kernels; dense ones that walk want the
