@@ -13,6 +13,10 @@ impl Plan {
         self.check_chemistry()?;
         self.check_mixing()?;
         self.exchange.as_ref().map_or(Ok(()), |exchange| exchange.check(self.axes.len()))?;
+        let varies = self.exchange.as_ref().is_some_and(|exchange| exchange.spreading.is_some());
+        require(!varies || self.transport.is_some(), || {
+            "dispersion by exchange that varies is in no flow".into()
+        })?;
         self.check_transport()?;
         self.outputs.iter().try_for_each(|output| self.check_output(output))
     }

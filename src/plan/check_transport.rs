@@ -168,7 +168,7 @@ fn check_darcy(darcy: &Darcy, n_axes: usize) -> Result<(), String> {
     }
 }
 
-fn check_dispersion(dispersion: &Dispersion, n_axes: usize) -> Result<(), String> {
+pub(super) fn check_dispersion(dispersion: &Dispersion, n_axes: usize) -> Result<(), String> {
     match dispersion {
         Dispersion::Constant(triangle) => {
             let is_right =

@@ -1,6 +1,7 @@
 //! What a run will cost: time from a table of measured stage costs, memory from the state.
 
 use super::chemistry::{Chemistry, Method};
+use super::exchange::Exchange;
 use super::integrator::Expected;
 use super::time_scales::TimeScales;
 use super::transport::{Flow, Transport};
@@ -167,16 +168,26 @@ fn own_values(plan: &Plan, n_values: f64) -> f64 {
 /// Nanoseconds per particle and step of an exchange. Parcels at rest are sorted, and their weights made, once in a run.
 fn exchange_cost(plan: &Plan, n_values: f64) -> f64 {
     let Some(exchange) = &plan.exchange else { return 0.0 };
+    let [anew, applied] = exchange_parts(plan, exchange, n_values);
+    let moves = plan.stages.iter().any(|stage| matches!(stage, Stage::Move | Stage::FusedStep));
+    let walks = moves || exchange.spreading.is_some();
+    applied + if walks { anew } else { table::STAND + anew / plan.time.n_steps.max(1) as f64 }
+}
+
+/// The same of the first step, which is the dearest.
+pub(super) fn first_exchange(plan: &Plan, exchange: &Exchange) -> f64 {
+    let n_values = (plan.components.len() * n_stored_values(plan)) as f64;
+    exchange_parts(plan, exchange, n_values).iter().sum()
+}
+
+/// What it takes to sort parcels and to make their weights, and to apply these.
+fn exchange_parts(plan: &Plan, exchange: &Exchange, n_values: f64) -> [f64; 2] {
     let sizes = exchange.sizes(plan, plan.time.step);
     let (weights, applied) = exchange.sums(sizes.share);
     let axis = plan.axes.len().clamp(1, 3) - 1;
-    let has_own = exchange.spreading.is_some();
-    let looked_at = if has_own { table::OWN_KERNELS } else { 1.0 } * sizes.neighbours;
+    let looked_at = if exchange.spreading.is_some() { table::OWN_KERNELS } else { 1.0 } * sizes.neighbours;
     let sum = table::PARCEL[axis] + looked_at * (table::PAIR[axis] + table::PAIR_VALUE * n_values);
-    let anew = table::SORT + weights * sum;
-    let walks = has_own || plan.stages.iter().any(|stage| matches!(stage, Stage::Move | Stage::FusedStep));
-    let prepared = if walks { anew } else { table::STAND + anew / plan.time.n_steps.max(1) as f64 };
-    prepared + applied * sum
+    [table::SORT + weights * sum, applied * sum]
 }
 
 /// Nanoseconds per particle and step of a walk along tracks.

@@ -4,6 +4,7 @@
 
 use super::Plan;
 use super::check::{check_operations, require};
+use super::check_transport::check_dispersion;
 use super::tape::Tape;
 use super::tape::dual::differentiate;
 use super::transport::Dispersion;
@@ -134,6 +135,7 @@ impl Exchange {
     /// Whether it is well-formed for so many axes.
     pub fn check(&self, d: usize) -> Result<(), String> {
         check_operations(&self.bandwidth.operations, 2)?;
+        self.spreading.as_ref().map_or(Ok(()), |spreading| check_dispersion(spreading, d))?;
         require(self.diffusion.len() == d * (d + 1) / 2, || {
             "the exchange has no dispersion for each axis".into()
         })?;

@@ -3,13 +3,13 @@
 //! Owns these numbers and messages (N109, N110, N206, N207). May use the sizes of the exchange, and `scenario` for
 //! the places. It deliberately asks nothing about single parcels: where they lie is known when they move.
 
-use super::cost::Cost;
+use super::cost::first_exchange;
 use super::exchange::{Exchange, Integration, Sizes};
 use super::explain_exchange::walks;
 use super::limits::{Limit, axis_name, round_down, short, short_up};
 use super::tape::Operation;
 use super::transport::Flow;
-use super::{Placement, Plan, Stage};
+use super::{Placement, Plan};
 use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{N109, N110, N206, N207};
 use crate::maths::scalar::pow;
@@ -38,7 +38,6 @@ struct Sized<'a> {
 pub(super) fn check(
     scenario: &Scenario,
     plan: &Plan,
-    cost: &Cost,
     limits: &mut Vec<Limit>,
     diagnostics: &mut Vec<Diagnostic>,
 ) {
@@ -51,7 +50,7 @@ pub(super) fn check(
         return;
     }
     limits.extend(sized.limits());
-    let refused = [sized.too_large_share(), sized.nobody(), sized.too_many(), sized.too_slow(cost)];
+    let refused = [sized.too_large_share(), sized.nobody(), sized.too_many(), sized.too_slow()];
     let n_before = diagnostics.len();
     diagnostics.extend(refused.into_iter().flatten());
     if diagnostics.len() == n_before {
@@ -215,8 +214,8 @@ impl Sized<'_> {
         })
     }
 
-    fn too_slow(&self, cost: &Cost) -> Option<Diagnostic> {
-        let per_parcel = cost.stages.iter().find(|(stage, _)| *stage == Stage::Exchange)?.1;
+    fn too_slow(&self) -> Option<Diagnostic> {
+        let per_parcel = first_exchange(self.plan, self.exchange);
         let seconds = 1e-9 * per_parcel * self.plan.particles.count as f64;
         (seconds > LONGEST_STEP).then(|| {
             Diagnostic::refused(N207, "one step of the exchange would not end")

@@ -56,7 +56,7 @@ pub fn check(
         exchange(scenario, plan, &mut limits, &mut diagnostics);
         numerical_dispersion(scenario, plan, &mut limits, &mut diagnostics);
     }
-    exchange_limits::check(scenario, plan, cost, &mut limits, &mut diagnostics);
+    exchange_limits::check(scenario, plan, &mut limits, &mut diagnostics);
     reaction_limits::check(scenario, plan, scales, &mut limits, &mut diagnostics);
     check_memory(scenario, plan, cost, memory, &mut diagnostics);
     (limits, diagnostics)
