@@ -24,7 +24,7 @@ pub(super) struct Chosen {
 /// - Equation: `Δt = n min(C / Σ_i |v_i|/Δ_i, F / Σ_i D/Δ_i²)`, at most the duration `T`, then shortened so that
 ///   `T/Δt` is whole.
 /// - Symbols: `C` bound of the Courant number, `F` that of the dispersion number, `v` velocity and `D` largest
-///   dispersion, by exchange that of a typical place, Δ_i sizes along the axes. Where flow is solved or read in cells
+///   dispersion, Δ_i sizes along the axes. Where flow is solved or read in cells
 ///   Δ_i are those of the cells, `v` is an estimate of the mean speed along each axis, and `n` is 8, as particles take sub-steps. Elsewhere Δ_i are
 ///   the smallest bins of averages and outputs, or a hundredth of the extent, and `n` is 1.
 /// - Range: any; `T` itself where nothing moves.

@@ -5,6 +5,7 @@
 use super::Plan;
 use super::check::{check_operations, require};
 use super::check_transport::check_dispersion;
+use super::shares;
 use super::tape::Tape;
 use super::tape::dual::differentiate;
 use super::transport::Dispersion;
@@ -130,6 +131,16 @@ impl Exchange {
     /// Dispersion by exchange along an axis, m²/s.
     pub fn along(&self, axis_idx: usize) -> f64 {
         self.diffusion[axis_idx * (axis_idx + 1) / 2 + axis_idx]
+    }
+
+    /// The same where it is largest, as far as that is known.
+    pub fn largest_along(&self, plan: &Plan, axis_idx: usize) -> f64 {
+        match (&self.spreading, &plan.transport) {
+            (Some(spreading), Some(transport)) => {
+                shares::spread(&plan.axes, spreading, shares::speed(&plan.axes, transport))
+            }
+            _ => self.along(axis_idx),
+        }
     }
 
     /// Whether it is well-formed for so many axes.

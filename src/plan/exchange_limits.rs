@@ -8,8 +8,8 @@ use super::exchange::{Exchange, Integration, Sizes};
 use super::explain_exchange::walks;
 use super::limits::{Limit, axis_name, round_down, short, short_up};
 use super::tape::Operation;
-use super::transport::Flow;
-use super::{Placement, Plan};
+use super::transport::{Dispersion, Flow};
+use super::{Placement, Plan, shares};
 use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{N109, N110, N206, N207};
 use crate::maths::scalar::pow;
@@ -227,13 +227,29 @@ impl Sized<'_> {
         })
     }
 
+    fn somewhere(&self) -> &'static str {
+        if self.exchange.spreading.is_some() { ", where dispersion is least" } else { "" }
+    }
+
+    /// The bandwidth, m, where dispersion by an expression is least.
+    fn least_bandwidth(&self) -> f64 {
+        let sizes = &self.sizes;
+        let Some(Dispersion::Isotropic(tape)) = &self.exchange.spreading else { return sizes.bandwidth };
+        let all = shares::places(&self.plan.axes, tape.operations.len());
+        let values = all.iter().map(|place| tape.evaluate(place)).filter(|value| *value > 0.0);
+        let ratio = (values.fold(sizes.diffusion, f64::min) / sizes.diffusion).sqrt();
+        self.exchange.bandwidth.evaluate(&[sizes.collocation * ratio, sizes.spacing])
+    }
+
     fn sparse(&self) -> Option<Diagnostic> {
-        let (found, least) = (self.sizes.effective / self.sizes.spacing, least_bandwidths(self.plan));
+        let kappa = self.sizes.effective / self.sizes.bandwidth;
+        let bandwidth = self.least_bandwidth();
+        let (found, least) = (kappa * bandwidth / self.sizes.spacing, least_bandwidths(self.plan));
         (found < least * (1.0 - SLACK)).then(|| {
             Diagnostic::warning(N109, "the bandwidth is small for the distance of the parcels")
-                .at(self.place, format!("{} m", short(self.sizes.bandwidth)))
+                .at(self.place, format!("{} m", short(bandwidth)))
                 .also(self.scenario.particles.count_span, format!("parcels {} m apart", short(self.sizes.spacing)))
-                .found(format!("{} of the distance, as a Gaussian", short(found)))
+                .found(format!("{} of the distance, as a Gaussian{}", short(found), self.somewhere()))
                 .expected(format!("at least {} for parcels that lie and move like these", short(least)))
                 .note("where parcels have few neighbours sums over them are no integrals: too little is exchanged")
                 .help(self.enough())
@@ -245,7 +261,8 @@ impl Sized<'_> {
         let sizes = &self.sizes;
         let (idx, reach) = (0..self.plan.axes.len()).find_map(|idx| {
             let axis = &self.plan.axes[idx];
-            let reach = sizes.radius * sizes.bandwidth * (self.exchange.along(idx) / sizes.diffusion).sqrt();
+            let along = self.exchange.largest_along(self.plan, idx);
+            let reach = sizes.radius * sizes.bandwidth * (along / sizes.diffusion).sqrt();
             (reach > axis.high - axis.low).then_some((idx, reach))
         })?;
         let axis = &self.plan.axes[idx];

@@ -49,7 +49,7 @@ pub(super) fn lines(plan: &Plan) -> Vec<String> {
     lines.push(error_line(plan, exchange.integration, &sizes));
     let is_gaussian = matches!(&exchange.kernel, Kernel::Catalogue(name) if name == "gaussian");
     let is_ordered = plan.particles.placement == Placement::Ordered && plan.particles.disorder == 0.0;
-    if is_ordered && is_gaussian {
+    if is_ordered && is_gaussian && exchange.spreading.is_none() {
         lines.push(format!(
             "sums over ordered parcels, while they rest: right to {} of a mode",
             short(lattice_error(&sizes))
@@ -76,10 +76,11 @@ fn dispersion_line(plan: &Plan, exchange: &Exchange) -> String {
     let rest = if walks(plan) { "the rest walks" } else { "nothing walks" };
     let what = match &exchange.spreading {
         None => format!("lower triangle ({}) m^2/s", exchanged.join(", ")),
-        Some(Dispersion::Velocity { longitudinal, transverse, molecular, .. }) => format!(
-            "longitudinal {} m, transverse {} m, molecular {} m^2/s",
+        Some(Dispersion::Velocity { longitudinal, transverse, transverse_vertical, molecular }) => format!(
+            "longitudinal {} m, transverse {} m, vertical {} m, molecular {} m^2/s",
             number(*longitudinal),
             number(*transverse),
+            number(*transverse_vertical),
             number(*molecular)
         ),
         Some(_) => "an expression of the place".to_owned(),
@@ -121,6 +122,9 @@ fn cutoff_line(exchange: &Exchange, sizes: &Sizes) -> Option<String> {
 
 /// The standard deviation from which a plume is right to a hundredth, by the leading error of the step.
 fn error_line(plan: &Plan, integration: Integration, sizes: &Sizes) -> String {
+    if plan.exchange.as_ref().is_some_and(|exchange| exchange.spreading.is_some()) {
+        return "leading error of step and kernel: of second order in h where dispersion varies, of first order across jumps".to_owned();
+    }
     let (d, time) = (plan.axes.len(), &plan.time);
     let dt = time.step.min(time.duration);
     let at_one = plume_error(sizes, integration, (d, time.duration, dt), 1.0);

@@ -28,7 +28,8 @@ pub(super) fn lines(plan: &Plan) -> Vec<String> {
         }
         lines.extend(change_lines(plan, transport, change));
     }
-    lines.push(dispersion_line(&transport.dispersion));
+    let part = if plan.exchange.is_some() { "what walks of the " } else { "" };
+    lines.push(format!("{part}{}", dispersion_line(&transport.dispersion)));
     lines.extend(path_line(plan, transport));
     lines.push(format!("porosity: {}", tape(&transport.porosity, "")));
     lines.extend(cell_line(transport));

@@ -103,7 +103,7 @@ fn spread_length(plan: &Plan, axis_idx: usize, step: f64) -> f64 {
 
 /// Dispersion coefficient along an axis, m²/s, by walk and exchange; the largest one where it varies.
 pub(super) fn dispersion(plan: &Plan, axis_idx: usize) -> f64 {
-    let exchanged = plan.exchange.as_ref().map_or(0.0, |exchange| exchange.along(axis_idx));
+    let exchanged = plan.exchange.as_ref().map_or(0.0, |exchange| exchange.largest_along(plan, axis_idx));
     walking_dispersion(plan, axis_idx) + exchanged
 }
 

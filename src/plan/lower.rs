@@ -127,7 +127,9 @@ fn only_tracks(plan: &mut Plan) {
 /// `step auto`: a step by the criteria, which the particles of a flow in cells divide further.
 fn choose_step(scenario: &Scenario, plan: &mut Plan, auto: Auto) -> Result<(), Vec<Diagnostic>> {
     let duration = scenario.run.duration;
-    let exchanged = plan.exchange.as_ref().map_or(0.0, |exchange| exchange.mean_diffusion(plan.axes.len()));
+    let exchanged = plan.exchange.as_ref().map_or(0.0, |exchange| {
+        (0..plan.axes.len()).map(|axis| exchange.largest_along(plan, axis)).fold(0.0, f64::max)
+    });
     let chosen = match &plan.transport {
         Some(transport) => {
             auto_step::of_masses(&plan.axes, &plan.outputs, transport, auto, (duration, exchanged))

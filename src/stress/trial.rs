@@ -8,6 +8,7 @@ use crate::engine::snapshot::{Outcome, Snapshot, Values};
 use crate::engine::{Control, RunError, Settings, run};
 use crate::flow::FlowSeries;
 use crate::plan::compile::{Compiled, Options, compile_edited};
+use crate::plan::transport::Transport;
 use crate::plan::{Output, OutputKind, Plan, Quantity};
 use crate::scenario::Scenario;
 use crate::stop;
@@ -212,7 +213,8 @@ impl Verdict {
 
 /// Whether values stay between those at the start: parcels exchange, and nothing else makes, brings or mixes any.
 fn is_bounded(plan: &Plan) -> bool {
-    plan.exchange.is_some() && plan.chemistry.is_none() && plan.transport.is_none() && plan.mixing.is_none()
+    let brings = plan.transport.as_ref().is_some_and(Transport::changes_water);
+    plan.exchange.is_some() && plan.chemistry.is_none() && plan.mixing.is_none() && !brings
 }
 
 /// With all parcels looked at, at the start and in the end.

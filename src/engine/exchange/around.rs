@@ -31,6 +31,7 @@ impl Around {
     #[inline(always)]
     pub(super) fn find_own(&mut self, idx: usize) {
         let mut at = 0;
+        self.own = 0;
         for row in 0..self.rows.len() {
             let (start, n) = self.rows[row];
             if idx >= start && idx < start + n {

@@ -36,8 +36,11 @@ impl Sorted {
 
     /// Whether all parcels are where they were when they were sorted, to the last bit.
     pub fn stands<const D: usize>(&self, space: &Space<D>, blocks: &[Block<D>]) -> bool {
-        let n: usize = blocks.iter().map(|block| block.n_particles).sum();
-        if n != self.places.len() || n == 0 {
+        let n = self.places.len();
+        // Parcels may have come and gone, in whatever block.
+        let are_same = self.ranks.len() == blocks.len()
+            && self.ranks.iter().zip(blocks).all(|(ranks, block)| ranks.len() == block.n_particles);
+        if !are_same || n == 0 {
             return false;
         }
         let are_still = |first: usize, places: &[u32]| {
@@ -152,4 +155,32 @@ impl Sorted {
 
 fn split(place: u32) -> (usize, usize) {
     ((place >> PLACE_BITS) as usize, place as usize & (BLOCK - 1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::{Axis, Side};
+
+    /// As many as before, but not the same: what stood behind in one block is now in another.
+    #[test]
+    fn parcels_that_come_and_go_do_not_stand() {
+        let (low_side, high_side) = (Side::Open, Side::Open);
+        let axes = [Axis { index: 0, low: 0.0, high: 1.0, low_side, high_side, bins: 1 }];
+        let space = Space::<1>::new(&axes, &[1.0], (0.1, 5.0), 6).unwrap();
+        let mut blocks = vec![Block::<1>::new(0, 3, 1).unwrap(), Block::new(1, 3, 1).unwrap()];
+        for (idx, block) in blocks.iter_mut().enumerate() {
+            block.ids = (0..3).map(|k| 3 * idx as u64 + k).collect();
+            block.positions[0] = block.ids.iter().map(|&id| id as f64 / 6.0).collect();
+        }
+        let mut sorted = Sorted::default();
+        assert!(!sorted.stands(&space, &blocks));
+        sorted.sort(&space, &blocks);
+        assert!(sorted.stands(&space, &blocks));
+        let (one, other) = blocks.split_at_mut(1);
+        one[0].take_from(&mut other[0], 1);
+        assert!(!sorted.stands(&space, &blocks));
+        blocks.truncate(1);
+        assert!(!sorted.stands(&space, &blocks));
+    }
 }

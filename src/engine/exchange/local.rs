@@ -25,7 +25,10 @@ use crate::state::particles::Block;
 use std::sync::Arc;
 
 /// Where nothing disperses a kernel has this part of the distance of parcels: it reaches nobody.
-const NOTHING: f64 = 1e-9;
+const NOTHING: f64 = 1e-6;
+
+/// Of a dispersion, m²/s: what may be below zero by rounding.
+const ROUNDING: f64 = 1e-12;
 
 /// Dispersion at the places of parcels.
 trait Tensors<const D: usize>: Send + Sync {
@@ -63,7 +66,13 @@ impl<const D: usize, M: Medium<D>> pulp::NullaryFnOnce for OnBlock<'_, D, M> {
             }
             medium.look(&Carrier::WATER, &places, &mut look);
             for lane in 0..n {
-                let tensor = medium.tensor(&look, lane);
+                let mut tensor = medium.tensor(&look, lane);
+                // Roots of a tensor that is no number are none; its slopes, which the drift has, tell.
+                for axis in 0..D {
+                    if !medium.drift(&look, axis, lane).is_finite() {
+                        tensor[axis][axis] = f64::NAN;
+                    }
+                }
                 for row in 0..D {
                     for column in 0..=row {
                         triangle[row * (row + 1) / 2 + column][first + lane] = tensor[row][column];
@@ -149,17 +158,17 @@ impl<const D: usize> Local<D> {
     }
 
     /// Works out the kernels of all parcels for steps of `dt_of_bandwidth`, of which one of `dt` is taken; half the mean
-    /// extent of a kernel of the radius along each axis is handed back.
+    /// extent of a kernel of the radius along each axis is handed back, and half the largest.
     pub fn look(
         &mut self,
         blocks: &[Block<D>],
         (dt_of_bandwidth, dt): (f64, f64),
         (radius, width): (f64, Width),
-    ) -> Result<[f64; D], RunError> {
+    ) -> Result<([f64; D], [f64; D]), RunError> {
         let n_entries = D * (D + 1) / 2;
         self.blocks.resize_with(blocks.len(), Vec::new);
         let mut tasks: Vec<_> =
-            self.blocks.iter_mut().zip(blocks).map(|(own, block)| (own, block, [0.0_f64; D])).collect();
+            self.blocks.iter_mut().zip(blocks).map(|(own, block)| (own, block, [[0.0_f64; D]; 2])).collect();
         let (tensors, rule) = (&self.tensors, &self.rule);
         parallel::for_each(&mut tasks, &|_, (own, block, extents)| {
             own.resize_with(n_entries + 1, Vec::new);
@@ -167,15 +176,18 @@ impl<const D: usize> Local<D> {
             tensors.of_block(block, width, own);
             *extents = rule.fill::<D>(own, (dt_of_bandwidth, dt));
         });
-        let mut sum = [0.0_f64; D];
-        for (.., extents) in &tasks {
-            sum.iter_mut().zip(extents).for_each(|(sum, own)| *sum += own);
+        let (mut sum, mut widest) = ([0.0_f64; D], [0.0_f64; D]);
+        for (.., [own, largest]) in &tasks {
+            for axis in 0..D {
+                sum[axis] += own[axis];
+                widest[axis] = widest[axis].max(largest[axis]);
+            }
         }
         if !sum.iter().all(|extent| extent.is_finite()) {
-            return Err(unsound("a dispersion that is no number where a parcel is"));
+            return Err(unsound("a dispersion by exchange that is no number where a parcel is"));
         }
         let n: usize = blocks.iter().map(|block| block.n_particles).sum();
-        Ok(sum.map(|extent| radius * extent / n.max(1) as f64))
+        Ok((sum.map(|extent| radius * extent / n.max(1) as f64), widest.map(|extent| radius * extent)))
     }
 
     /// Brings them into the order of cells.
@@ -214,9 +226,13 @@ impl Rule {
     /// - Symbols: `h` bandwidth by the rule of the scene, with the collocation length of the place.
     /// - Range: where there is no dispersion along some direction nothing is exchanged.
     /// - Source: methods, section 6.4; halves, as a pair has `½ (H_i⁻¹ + H_j⁻¹)`.
-    /// - Shape: in place; sums of half extents along each axis are handed back, in m.
-    fn fill<const D: usize>(&self, columns: &mut [Vec<f64>], (dt_of_bandwidth, dt): (f64, f64)) -> [f64; D] {
-        let mut extents = [0.0; D];
+    /// - Shape: in place; sums of half extents along each axis are handed back, and the largest, in m.
+    fn fill<const D: usize>(
+        &self,
+        columns: &mut [Vec<f64>],
+        (dt_of_bandwidth, dt): (f64, f64),
+    ) -> [[f64; D]; 2] {
+        let [mut extents, mut widest] = [[0.0; D]; 2];
         let n_entries = D * (D + 1) / 2;
         let n = columns[n_entries].len();
         let mut tensor = [0.0; 6];
@@ -247,11 +263,15 @@ impl Rule {
             }
             for axis in 0..D {
                 let own = tensor[axis * (axis + 1) / 2 + axis];
-                extents[axis] += if is_there { (square * own).sqrt() } else { 0.0 };
+                // What is no dispersion is found by its sum; rounding may leave a little less than nothing.
+                let is_one = own >= -ROUNDING * size && own.is_finite() && det.is_finite();
+                let half = if is_there { (square * own).sqrt() } else { 0.0 };
+                extents[axis] += if is_one { half } else { f64::NAN };
+                widest[axis] = if half > widest[axis] { half } else { widest[axis] };
             }
             columns[n_entries][idx] = share;
         }
-        extents
+        [extents, widest]
     }
 }
 

@@ -183,8 +183,8 @@ impl<const D: usize> Exchange<D> {
         let Some(local) = &mut self.local else { return Ok(()) };
         let (plan, radius) = (program.plan, self.sizes.radius);
         let step = plan.time.step.min(plan.time.duration);
-        let reach = local.look(blocks, (step, dt), (radius, width))?;
-        self.space = Space::plain(&closed(plan), radius, reach, plan.particles.count);
+        let extents = local.look(blocks, (step, dt), (radius, width))?;
+        self.space = Space::plain(&closed(plan), radius, extents, plan.particles.count);
         Ok(())
     }
 

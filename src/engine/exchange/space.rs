@@ -17,6 +17,9 @@ const NARROWEST: f64 = 0.3;
 /// Added to ranges, over the radius: rounding must not cut off what is just within it.
 const SLACK: f64 = 1e-9;
 
+/// Of the coordinates, added to the ends of a cell.
+const ULPS: f64 = 4.0 * f64::EPSILON;
+
 /// Added to a number of moderate size it leaves the nearest whole number in the low bits.
 const SHIFT: f64 = 4_503_599_627_370_496.0;
 const LOW_BITS: u64 = (1 << 32) - 1;
@@ -82,12 +85,19 @@ impl<const D: usize> Space<D> {
         };
         space.enclose(axes);
         space.divide(n_particles);
-        space.images = space.images_of(axes);
+        let reach = std::array::from_fn(|axis| space.radius / space.rows[axis][axis]);
+        space.images = space.images_of(axes, reach);
         Some(space)
     }
 
-    /// The space of the scene itself, with cells for kernels of a mean reach along each axis, m, that end at a radius.
-    pub fn plain(axes: &[Axis], radius: f64, reach: [f64; D], n_particles: u64) -> Self {
+    /// The space of the scene itself, with cells for kernels of a mean reach along each axis, m, that end at a radius,
+    /// and images for the widest of them.
+    pub fn plain(
+        axes: &[Axis],
+        radius: f64,
+        (reach, widest): ([f64; D], [f64; D]),
+        n_particles: u64,
+    ) -> Self {
         let (low, high) = (|axis: usize| axes[axis].low, |axis: usize| axes[axis].high);
         let mut rows = [[0.0; D]; D];
         (0..D).for_each(|axis| rows[axis][axis] = 1.0);
@@ -101,7 +111,7 @@ impl<const D: usize> Space<D> {
             cells: [1; D],
             last: [0.0; D],
             together: [0.0; D],
-            // Images of the nearest sides are enough: no distance is asked of them.
+            // No distance is asked of it.
             reach: 0.0,
             reach_square: 0.0,
             slack: 0.0,
@@ -112,9 +122,7 @@ impl<const D: usize> Space<D> {
         let least = |axis: usize| 1e-9 * (high(axis) - low(axis));
         let part = |axis: usize| if axis + 1 == D { 1.0 / ALONG } else { 0.5 };
         space.cut(n_particles, std::array::from_fn(|axis| (part(axis) * reach[axis]).max(least(axis))));
-        space.radius = 0.0;
-        space.images = space.images_of(axes);
-        space.radius = radius;
+        space.images = space.images_of(axes, widest);
         space
     }
 
@@ -130,9 +138,11 @@ impl<const D: usize> Space<D> {
     /// Where a cell along an axis begins and ends; the outer ones have no end.
     #[inline(always)]
     pub fn strip(&self, axis: usize, cell: usize) -> (f64, f64) {
+        // Rounding must not part a place from its cell.
+        let slack = ULPS * (self.low[axis].abs() + self.high[axis].abs());
         let begin = self.low[axis] + self.edge[axis] * cell as f64;
-        let low = if cell == 0 { f64::NEG_INFINITY } else { begin };
-        let high = if cell + 1 == self.cells[axis] { f64::INFINITY } else { begin + self.edge[axis] };
+        let low = if cell == 0 { f64::NEG_INFINITY } else { begin - slack };
+        let high = if cell + 1 == self.cells[axis] { f64::INFINITY } else { begin + self.edge[axis] + slack };
         (low, high)
     }
 
@@ -277,8 +287,8 @@ impl<const D: usize> Space<D> {
         is_near
     }
 
-    /// All combinations of the images of single axes.
-    fn images_of(&self, axes: &[Axis]) -> Vec<Image<D>> {
+    /// All combinations of the images of single axes, for kernels of a reach along each, m.
+    fn images_of(&self, axes: &[Axis], reach: [f64; D]) -> Vec<Image<D>> {
         let still = Image::NONE;
         let mut all = vec![still];
         for (axis, own) in axes.iter().enumerate() {
@@ -289,7 +299,7 @@ impl<const D: usize> Space<D> {
             (0..D).for_each(|row| column[row] = self.rows[row][axis]);
             let length = own.high - own.low;
             // As many images as a kernel can reach over.
-            let n = (self.radius / (column[axis] * length)).min(64.0) as i64 + 1;
+            let n = (reach[axis] / length).min(64.0) as i64 + 1;
             let is_mirror = |side: Side| side == Side::Reflect && !is_coupled;
             let mut options = Vec::new();
             if own.low_side == Side::Periodic {
