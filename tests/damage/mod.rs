@@ -44,10 +44,19 @@ pub fn shipped_scenes() -> Vec<(String, String)> {
 /// The file that one of the scenes uses.
 const USED: (&str, &str) = ("used/column.lam", include_str!("../scenes/used/column.lam"));
 
-/// A text as a scene, with the file that it may use.
+/// Those that a study of several scenes uses.
+const PARTS: &[(&str, &str)] = &[
+    ("line.lam", include_str!("../../experiments/kernel_size_study/line.lam")),
+    ("plane.lam", include_str!("../../experiments/kernel_size_study/plane.lam")),
+];
+
+/// A text as a scene, with the files that it may use.
 pub fn sources(text: &str) -> Sources {
     let mut sources = Sources::single("scene.lam", text);
     sources.add(USED.0, USED.1);
+    for (name, part) in PARTS.iter().filter(|(name, _)| text.contains(name)) {
+        sources.add(*name, *part);
+    }
     // One of the scenes reads the flow of a model.
     for (name, bytes) in FILES.iter().filter(|(name, _)| text.contains(name)) {
         sources.add_data(Arc::new(DataFile::new((*name).to_owned(), bytes.to_vec())));
