@@ -6,7 +6,7 @@
 use super::error::RunError;
 use super::observe::{Draws, Instant};
 use super::parallel;
-use super::program::{Role, Work};
+use super::program::Work;
 use super::run::Run;
 use super::schedule::{Due, step_length};
 use super::track::tracker::Steps;
@@ -25,7 +25,7 @@ impl<const D: usize> Run<'_, D> {
         if self.water.is_some() {
             return self.flow_ahead(due).map(Some);
         }
-        if self.reactions.reactor.is_none() && self.exchange.is_none() {
+        if self.reactions.reactor.is_none() && self.exchanges.are_none() {
             return Ok(None);
         }
         let plan_step = step_length(&self.program.plan.time, due.steps);
@@ -42,12 +42,12 @@ impl<const D: usize> Run<'_, D> {
             between.carry(program, &draws, block);
         });
         ahead.is_averaged = false;
-        ahead.exchange(due.steps, due.fraction * plan_step)?;
+        ahead.exchange_all(due.steps, due.fraction * plan_step)?;
         if program.is_coupled() {
             let still = program.mover.leap(0.0, 0.0);
             ahead.pass(Work { averages: true, ..Work::default() }, due.steps, still, &[])?;
         }
-        if self.relaxes() {
+        if self.program.relaxes() {
             ahead.pending = Some(between.decays.clone());
         }
         ahead.reactions.end_step();
@@ -73,8 +73,8 @@ impl<const D: usize> Run<'_, D> {
         }
         let first = due.steps + ASIDE;
         ahead.flow_on(Steps { first, end: first + 1, t, dt })?;
-        ahead.exchange(due.steps, dt)?;
-        let relaxes = ahead.relaxes();
+        ahead.exchange_all(due.steps, dt)?;
+        let relaxes = ahead.program.relaxes();
         if relaxes || ahead.program.is_coupled() {
             let still = ahead.program.mover.leap(0.0, 0.0);
             ahead.pass(Work { averages: true, ..Work::default() }, due.steps, still, &[])?;
@@ -83,10 +83,5 @@ impl<const D: usize> Run<'_, D> {
         ahead.reactions.end_step();
         ahead.settle_pending(due.steps)?;
         Ok(ahead)
-    }
-
-    /// Whether anything goes towards a mean in a step.
-    fn relaxes(&self) -> bool {
-        self.program.roles.iter().any(|role| !matches!(role, Role::Fixed))
     }
 }

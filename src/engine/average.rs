@@ -138,7 +138,7 @@ impl Means {
         for (component, mixed) in self.mixed.iter_mut().enumerate() {
             mixed.clear();
             mixed.resize(n_slots, 0.0);
-            for &(slot, weight) in &program.mean_weights {
+            for &(slot, weight) in &program.seen_weights {
                 let column = &self.columns[component * program.roles.len() + slot];
                 mixed.iter_mut().zip(column).for_each(|(mixed, mean)| *mixed += weight * mean);
             }

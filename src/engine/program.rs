@@ -54,6 +54,8 @@ pub struct Work {
     pub moves: bool,
     pub bounds: bool,
     pub exchanges: bool,
+    /// Exchange of zones with means over the parcels around.
+    pub blends: bool,
     pub averages: bool,
 }
 
@@ -70,6 +72,8 @@ pub struct Program<'a, const D: usize> {
     pub terms: Vec<Term>,
     /// `(slot, weight)` of the simulated zones in ū; the weights sum to 1.
     pub mean_weights: Vec<(usize, f64)>,
+    /// The same of what is seen of a particle: its zones, or all that it stores where it stores its mean.
+    pub seen_weights: Vec<(usize, f64)>,
     /// Σ η of the simulated zones: how much of a deviation from ū is seen in U.
     pub carried_fraction: f64,
     /// The passes over memory that make a step, in order.
@@ -102,6 +106,14 @@ impl<'a, const D: usize> Program<'a, D> {
         let mover = Mover::new(&plan.walk).ok_or_else(|| unsound("a walk that does not fit the axes"))?;
         let (roles, terms) = columns(plan.mixing.as_ref());
         let (mean_weights, carried_fraction) = weights(plan.mixing.as_ref(), &terms, &roles);
+        let stored = terms.iter().filter_map(|term| match *term {
+            Term::Column { slot, fraction } => Some((slot, fraction)),
+            Term::Mean { .. } => None,
+        });
+        let (seen_weights, carried_fraction) = match plan.has_kernel_mean() {
+            true => (stored.collect(), 1.0),
+            false => (mean_weights.clone(), carried_fraction),
+        };
         let mut program = Self {
             plan,
             rules,
@@ -109,6 +121,7 @@ impl<'a, const D: usize> Program<'a, D> {
             roles,
             terms,
             mean_weights,
+            seen_weights,
             carried_fraction,
             passes: Vec::new(),
             species: plan.species.clone(),
@@ -148,8 +161,13 @@ impl<'a, const D: usize> Program<'a, D> {
         }
     }
 
-    /// Whether particles see means at all.
+    /// Whether particles see means of bins.
     pub fn has_mixing(&self) -> bool {
+        self.plan.sees_bins()
+    }
+
+    /// Whether particles are divided into zones.
+    pub fn has_zones(&self) -> bool {
         self.plan.mixing.is_some()
     }
 
@@ -159,21 +177,26 @@ impl<'a, const D: usize> Program<'a, D> {
 
     /// Whether what a particle reacts with hangs on its bin: a mean, or what lives there.
     pub fn is_coupled(&self) -> bool {
-        self.has_mixing() || self.plan.has_immobile()
+        self.plan.hangs_on_bins()
     }
 
-    /// Factor `e^{−χΔt/2}` per slot; `None` where nothing relaxes.
+    /// Whether any zone approaches the mean of its bin.
+    pub fn relaxes(&self) -> bool {
+        self.has_mixing() && self.roles.iter().any(|role| !matches!(role, Role::Fixed))
+    }
+
+    /// Factor `e^{−χΔt/2}` per slot; `None` where nothing relaxes towards the mean of its bin.
     pub fn decays(&self, dt: f64) -> Vec<Option<f64>> {
         let decay = |role: &Role| match *role {
-            Role::Relaxing(rate) => Some(crate::maths::scalar::exp(-0.5 * rate * dt)),
-            Role::Fixed | Role::Mean => None,
+            Role::Relaxing(rate) if self.has_mixing() => Some(crate::maths::scalar::exp(-0.5 * rate * dt)),
+            Role::Relaxing(_) | Role::Fixed | Role::Mean => None,
         };
         self.roles.iter().map(decay).collect()
     }
 
     /// Turns the stages of the plan into passes, leaving out what has nothing to do.
     fn passes_of(&self, stages: &[Stage]) -> Vec<Work> {
-        let relaxes = self.roles.iter().any(|role| !matches!(role, Role::Fixed));
+        let relaxes = self.relaxes();
         let is_tracked = self.plan.transport.is_some();
         let moves = is_tracked || self.mover.is_moving();
         let reacts = self.plan.reacts_in_steps();
@@ -186,6 +209,7 @@ impl<'a, const D: usize> Program<'a, D> {
             Stage::Move => Work { moves, ..Work::default() },
             Stage::Bound => Work { bounds: moves && !is_tracked, ..Work::default() },
             Stage::Exchange => Work { exchanges: self.plan.exchange.is_some(), ..Work::default() },
+            Stage::KernelMean => Work { blends: self.plan.has_kernel_mean(), ..Work::default() },
             Stage::Average => Work { averages, ..Work::default() },
             Stage::FusedStep => Work {
                 mixes: relaxes,
@@ -193,7 +217,7 @@ impl<'a, const D: usize> Program<'a, D> {
                 moves,
                 bounds: moves,
                 averages,
-                exchanges: false,
+                ..Work::default()
             },
             Stage::Observe => Work::default(),
         });
@@ -209,6 +233,12 @@ fn columns(mixing: Option<&Mixing>) -> (Vec<Role>, Vec<Term>) {
     let (mut roles, mut terms) = (Vec::new(), Vec::new());
     if mixing.is_well_mixed {
         roles.push(Role::Fixed);
+    }
+    if mixing.averaging.is_some() {
+        with_kernel_mean(mixing, &mut roles, &mut terms);
+        return (roles, terms);
+    }
+    if mixing.is_well_mixed {
         terms.push(Term::Mean { fraction: 1.0 });
     }
     for zone in &mixing.zones {
@@ -230,6 +260,25 @@ fn columns(mixing: Option<&Mixing>) -> (Vec<Role>, Vec<Term>) {
     (roles, terms)
 }
 
+/// The same where a particle stores the mean that it sees: once, for all zones that are instant.
+fn with_kernel_mean(mixing: &Mixing, roles: &mut Vec<Role>, terms: &mut Vec<Term>) {
+    let mut fraction = 0.0;
+    for zone in &mixing.zones {
+        match zone.rate {
+            ZoneRate::Instant => fraction += zone.fraction,
+            ZoneRate::Finite(rate) => {
+                terms.push(Term::Column { slot: roles.len(), fraction: zone.fraction });
+                roles.push(if rate > 0.0 { Role::Relaxing(rate) } else { Role::Fixed });
+            }
+        }
+    }
+    if mixing.stores_mean() {
+        let fraction = if mixing.is_well_mixed { 1.0 } else { fraction };
+        terms.push(Term::Column { slot: roles.len(), fraction });
+        roles.push(Role::Mean);
+    }
+}
+
 fn weights(mixing: Option<&Mixing>, terms: &[Term], roles: &[Role]) -> (Vec<(usize, f64)>, f64) {
     if mixing.is_some_and(|mixing| mixing.is_well_mixed) {
         return (vec![(0, 1.0)], 0.0);
@@ -238,7 +287,8 @@ fn weights(mixing: Option<&Mixing>, terms: &[Term], roles: &[Role]) -> (Vec<(usi
         Term::Column { slot, fraction } => Some((slot, fraction)),
         Term::Mean { .. } => None,
     });
-    let simulated: Vec<(usize, f64)> = simulated.collect();
+    // A stored mean is no zone that is simulated.
+    let simulated: Vec<(usize, f64)> = simulated.filter(|&(slot, _)| roles[slot] != Role::Mean).collect();
     let sum: f64 = simulated.iter().map(|&(_, fraction)| fraction).sum();
     let n = simulated.len() as f64;
     debug_assert!(simulated.iter().all(|&(slot, _)| !matches!(roles[slot], Role::Mean)));

@@ -132,7 +132,10 @@ impl<const D: usize> Reaction<'_, D> {
 
     /// Whether what is stored is what reacts: no zones, and nothing in bins.
     fn is_single(&self) -> bool {
-        self.immobile.is_empty() && matches!(self.program.terms[..], [Term::Column { fraction: 1.0, .. }])
+        let stores_one = self.program.roles.len() == 1;
+        stores_one
+            && self.immobile.is_empty()
+            && matches!(self.program.terms[..], [Term::Column { fraction: 1.0, .. }])
     }
 
     /// Positions along x, y, z; nothing along axes that were left out.

@@ -123,8 +123,8 @@ impl Reactions {
             resting,
             observed: Observed::new(plan).map_err(|what| unsound(&what))?,
             speciation: Speciation::new(plan).map_err(|what| unsound(&what))?,
-            reversal: Reversal::new(plan).filter(|_| program.has_mixing()),
-            shown: Reversal::shown(plan).filter(|_| program.has_mixing()),
+            reversal: Reversal::new(plan).filter(|_| program.has_zones()),
+            shown: Reversal::shown(plan).filter(|_| program.has_zones()),
             is_symmetric: splitting == Some(Splitting::Strang),
             spans: Vec::new(),
             step: Span { t: 0.0, dt: 0.0 },
@@ -289,7 +289,7 @@ impl<const D: usize> Run<'_, D> {
         if let Some(recipes) = self.reactions.observed.as_ref().and_then(|observed| observed.recipes(t)) {
             self.program.species = recipes;
         }
-        let takes_copies = self.reactions.reactor.is_some() || self.exchange.is_some();
+        let takes_copies = self.reactions.reactor.is_some() || !self.exchanges.are_none();
         if takes_copies { self.settle_pending(steps.saturating_sub(1)) } else { Ok(()) }
     }
 

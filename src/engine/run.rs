@@ -10,7 +10,7 @@ use super::clock::Clock;
 use super::conserved;
 use super::control::{Control, Settings};
 use super::error::RunError;
-use super::exchange::Exchange;
+use super::exchange::Exchanges;
 use super::mass::{gate::Gates, media::flow_of};
 use super::observe::{self, Instant, Lab};
 use super::parallel::{self, Pool};
@@ -66,7 +66,7 @@ pub struct Run<'a, const D: usize> {
     pub gates: Gates,
     pub quanta: Quanta,
     /// What parcels exchange with those around them.
-    pub exchange: Option<Exchange<D>>,
+    pub exchanges: Exchanges<D>,
 }
 
 /// Sums and the first trouble of consecutive blocks.
@@ -87,6 +87,7 @@ pub fn run<const D: usize>(
     let calendar = Calendar::new(&plan.time, &[]);
     let mut dues = schedule(plan, &calendar)?;
     let mut run = Run::<D>::new(plan, settings, &mut dues)?;
+    run.take_means()?;
     let mut loop_clock = Clock::start();
     let mut dues = dues.iter().peekable();
     for step in 0..=plan.time.n_steps {
@@ -159,7 +160,7 @@ impl<'a, const D: usize> Run<'a, D> {
         let n_groups = blocks.len().div_ceil(blocks_per_group);
         let groups = (0..n_groups).map(|_| Group::default()).collect();
         Ok(Self {
-            exchange: Exchange::new(&program, settings)?,
+            exchanges: Exchanges::new(&program, settings)?,
             width,
             walk: Stream::new(plan.seed, Purpose::Walk),
             bridge: Stream::new(plan.seed, Purpose::Bridge),
@@ -204,7 +205,7 @@ impl<'a, const D: usize> Run<'a, D> {
             water: self.water.as_ref().map(Water::copy),
             gates: Gates::default(),
             quanta: self.quanta,
-            exchange: self.exchange.as_ref().map(Exchange::copy),
+            exchanges: self.exchanges.copy(),
         }
     }
 
@@ -231,8 +232,8 @@ impl<'a, const D: usize> Run<'a, D> {
                 self.flow_on(Steps { first: step, end: step + 1, t, dt })?;
                 continue;
             }
-            if work.exchanges {
-                self.exchange(step, dt)?;
+            if work.exchanges || work.blends {
+                self.exchange(work, step, dt)?;
                 continue;
             }
             if work.reacts && self.program.is_coupled() {
@@ -243,7 +244,7 @@ impl<'a, const D: usize> Run<'a, D> {
             self.is_averaged &= !work.moves;
             self.pass(work, step, leap, &spans)?;
             if work.averages {
-                self.pending = Some(self.program.decays(dt));
+                self.pending = self.program.relaxes().then(|| self.program.decays(dt));
                 self.check_amounts(step)?;
             }
         }

@@ -172,6 +172,21 @@ impl super::Plan {
         self.components.iter().any(|component| component.is_immobile)
     }
 
+    /// Whether particles see means of bins.
+    pub fn sees_bins(&self) -> bool {
+        self.mixing.is_some() && !self.has_kernel_mean()
+    }
+
+    /// Whether zones exchange with means over the parcels around.
+    pub fn has_kernel_mean(&self) -> bool {
+        self.mixing.as_ref().is_some_and(|mixing| mixing.averaging.is_some())
+    }
+
+    /// Whether what a particle reacts with hangs on its bin: a mean, or what lives there.
+    pub fn hangs_on_bins(&self) -> bool {
+        self.sees_bins() || self.has_immobile()
+    }
+
     /// Components that particles carry; those that live in bins come last.
     pub fn n_mobile(&self) -> usize {
         self.components.iter().filter(|component| !component.is_immobile).count()

@@ -5,7 +5,7 @@ use super::exchange::Exchange;
 use super::integrator::Expected;
 use super::time_scales::TimeScales;
 use super::transport::{Flow, Transport};
-use super::{Normals, Output, OutputKind, Plan, Stage, ZoneRate, turns};
+use super::{Normals, Output, OutputKind, Plan, Stage, Zone, ZoneRate, turns};
 use serde::Serialize;
 
 /// Measured on one core of a shared x86-64 server (Zen 3, AVX2) by `make bench`; nanoseconds.
@@ -93,8 +93,11 @@ pub fn n_stored_values(plan: &Plan) -> usize {
     match &plan.mixing {
         None => 1,
         Some(mixing) => {
-            let n_zones = mixing.zones.iter().filter(|zone| zone.is_stored).count();
-            n_zones + usize::from(mixing.is_well_mixed)
+            let stores_mean = mixing.stores_mean();
+            let is_of_its_own =
+                |zone: &&Zone| zone.is_stored && !(stores_mean && zone.rate == ZoneRate::Instant);
+            let n_zones = mixing.zones.iter().filter(is_of_its_own).count();
+            n_zones + usize::from(mixing.is_well_mixed) + usize::from(stores_mean)
         }
     }
 }
@@ -122,6 +125,7 @@ pub fn estimate(plan: &Plan, scales: Option<&TimeScales>) -> Cost {
         }
         Stage::Bound => table::BOUND * n_axes,
         Stage::Exchange => exchange_cost(plan, n_values),
+        Stage::KernelMean => means_cost(plan),
         Stage::Average => table::AVERAGE * n_values,
         Stage::FusedStep => {
             let step = move_cost * n_axes + table::BOUND * n_axes + table::AVERAGE * n_values;
@@ -172,6 +176,38 @@ fn exchange_cost(plan: &Plan, n_values: f64) -> f64 {
     let moves = plan.stages.iter().any(|stage| matches!(stage, Stage::Move | Stage::FusedStep));
     let walks = moves || exchange.spreading.is_some();
     applied + if walks { anew } else { table::STAND + anew / plan.time.n_steps.max(1) as f64 }
+}
+
+/// Means over the parcels around: weights, the sums of each rate, and the mean that is stored.
+fn means_cost(plan: &Plan) -> f64 {
+    let Some(mixing) = &plan.mixing else { return 0.0 };
+    let Some(averaging) = &mixing.averaging else { return 0.0 };
+    let d = plan.axes.len();
+    let axis = d.clamp(1, 3) - 1;
+    let extents = averaging.extents(plan);
+    let sum = |n_values: f64| {
+        table::PARCEL[axis] + extents.neighbours * (table::PAIR[axis] + table::PAIR_VALUE * n_values)
+    };
+    let (n_components, exchange) = (plan.n_mobile() as f64, averaging.as_exchange(d));
+    let of_zone = |zone: &Zone| match zone.rate {
+        ZoneRate::Finite(rate) if rate > 0.0 => jumps(0.5 * rate * plan.time.step) * sum(n_components),
+        ZoneRate::Finite(_) | ZoneRate::Instant => 0.0,
+    };
+    let zones: f64 = mixing.zones.iter().map(of_zone).sum();
+    let stored = if mixing.stores_mean() { sum(n_components) } else { 0.0 };
+    table::SORT + exchange.sums(1.0).0 * sum(0.0) + zones + stored
+}
+
+/// Sums of an exponential step up to a rest of 1e-12, about: terms of a Poisson distribution.
+fn jumps(share: f64) -> f64 {
+    let (mut weight, mut n) = (crate::maths::scalar::exp(-share), 0.0);
+    let mut left = 1.0 - weight;
+    while left > 1e-12 && n < 12.0 * share.sqrt() + share + 40.0 {
+        n += 1.0;
+        weight *= share / n;
+        left -= weight;
+    }
+    n.max(1.0)
 }
 
 /// The same of the first step, which is the dearest.

@@ -2,7 +2,7 @@
 
 use super::compile::Compiled;
 use super::cost::{Cost, n_stored_values};
-use super::{Normals, Plan, Quantity, Stage, ZoneRate};
+use super::{Mixing, Normals, Plan, Quantity, Stage, ZoneRate};
 use super::{explain_exchange, explain_reactions, explain_transport};
 use crate::diagnostic::number;
 use std::fmt::Write as _;
@@ -18,6 +18,7 @@ pub fn explain(compiled: &Compiled, name: &str, title: Option<&str>) -> String {
     section(&mut text, "what runs", &scene_lines(&compiled.plan));
     section(&mut text, "transport", &explain_transport::lines(&compiled.plan));
     section(&mut text, "exchange", &explain_exchange::lines(&compiled.plan));
+    section(&mut text, "means over the parcels around", &explain_exchange::mean_lines(&compiled.plan));
     section(&mut text, "each step, in this order", &step_lines(compiled));
     section(&mut text, "what particles carry", &field_lines(&compiled.plan));
     section(&mut text, "reactions", &explain_reactions::lines(&compiled.plan));
@@ -119,6 +120,7 @@ fn stage_words(stage: Stage) -> &'static str {
         Stage::Move => "move: drift and dispersion",
         Stage::Bound => "bound: apply the sides of the domain",
         Stage::Exchange => "exchange: parcels and those around them exchange what they carry",
+        Stage::KernelMean => "kernel mean: zones exchange with the means over the parcels around",
         Stage::Average => "average: sums and means per bin",
         Stage::FusedReact => "mix and react in one pass over memory",
         Stage::FusedStep => "mix, move, bound and average in one pass over memory",
@@ -139,6 +141,30 @@ fn step_lines(compiled: &Compiled) -> Vec<String> {
     compiled.cost.stages.iter().map(line).collect()
 }
 
+/// Zones, and what is stored of them.
+fn zone_lines(mixing: &Mixing) -> Vec<String> {
+    let mut lines = Vec::new();
+    for zone in &mixing.zones {
+        let rate = match zone.rate {
+            ZoneRate::Instant => "instant".to_owned(),
+            ZoneRate::Finite(rate) => format!("rate {} /s", number(rate)),
+        };
+        let stored = if zone.is_stored { "stored" } else { "not stored" };
+        lines.push(format!("zone {}: fraction {}, {rate}, {stored}", zone.name, number(zone.fraction)));
+    }
+    if mixing.is_well_mixed {
+        lines.push(match mixing.averaging {
+            None => {
+                "every zone is instant: particles carry an unmixed value, means are taken at outputs".into()
+            }
+            Some(_) => "every zone is instant: particles carry an unmixed value and its mean".into(),
+        });
+    } else if mixing.stores_mean() {
+        lines.push("the mean that instant zones are at is stored".into());
+    }
+    lines
+}
+
 fn field_lines(plan: &Plan) -> Vec<String> {
     let mut lines = Vec::new();
     if plan.carries_mass() {
@@ -154,21 +180,7 @@ fn field_lines(plan: &Plan) -> Vec<String> {
         lines.push(format!("{}: {values} each, beside the position", names.join(", ")));
     }
     lines.extend(explain_reactions::immobile_line(plan));
-    if let Some(mixing) = &plan.mixing {
-        for zone in &mixing.zones {
-            let rate = match zone.rate {
-                ZoneRate::Instant => "instant".to_owned(),
-                ZoneRate::Finite(rate) => format!("rate {} /s", number(rate)),
-            };
-            let stored = if zone.is_stored { "stored" } else { "not stored" };
-            lines.push(format!("zone {}: fraction {}, {rate}, {stored}", zone.name, number(zone.fraction)));
-        }
-        if mixing.is_well_mixed {
-            lines.push(
-                "every zone is instant: particles carry an unmixed value, means are taken at outputs".into(),
-            );
-        }
-    }
+    lines.extend(plan.mixing.iter().flat_map(zone_lines));
     for species in &plan.species {
         let is_itself = matches!(species.terms.as_slice(), [(component, factor)]
             if *factor == 1.0 && plan.components[*component].name == species.name && species.constant == 0.0);

@@ -15,6 +15,31 @@ const ASKED: f64 = 0.01;
 /// A leading error below this part of the step's own is rounding.
 const ROUNDING: f64 = 1e-9;
 
+/// Kernel, lengths and neighbours of the means that zones exchange with; nothing where these are of bins.
+pub(super) fn mean_lines(plan: &Plan) -> Vec<String> {
+    let Some(mixing) = &plan.mixing else { return Vec::new() };
+    let Some(averaging) = &mixing.averaging else { return Vec::new() };
+    let exchange = averaging.as_exchange(plan.axes.len());
+    let extents = averaging.extents(plan);
+    vec![
+        kernel_line(&exchange, &exchange.sizes(plan, plan.time.step)),
+        format!(
+            "bandwidth h = {} m: {} of the distance of parcels of {} m",
+            short(extents.bandwidth),
+            short(extents.bandwidth / extents.spacing),
+            short(extents.spacing)
+        ),
+        format!(
+            "about {} neighbours within {} m ({} bandwidths), as noisy as {} parcels in a bin",
+            short(extents.neighbours),
+            short(extents.radius * extents.bandwidth),
+            short(extents.radius),
+            short(extents.effective)
+        ),
+        format!("normalise {}, integrate exponential", averaging.normalisation.word()),
+    ]
+}
+
 /// Kernel, lengths, share, dispersion and errors; nothing without an exchange.
 pub(super) fn lines(plan: &Plan) -> Vec<String> {
     let Some(exchange) = &plan.exchange else { return Vec::new() };

@@ -6,7 +6,9 @@
 use super::cost::Cost;
 use super::passes::Draft;
 use super::time_scales::TimeScales;
-use super::{OutputKind, Plan, ZoneRate, auto_step, edges, exchange_limits, reaction_limits, shares};
+use super::{
+    OutputKind, Plan, ZoneRate, auto_step, averaging_limits, edges, exchange_limits, reaction_limits, shares,
+};
 use crate::diagnostic::codes::{N101, N102, N103, N104, N201, N202, N203, N204, N301};
 use crate::diagnostic::{Diagnostic, number, precise};
 use crate::scenario::{self, MAX_BINS, Scenario};
@@ -23,15 +25,15 @@ pub struct Limit {
 }
 
 /// Particles per bin below which means are mostly noise, and below which they mean nothing.
-const FEW_PER_BIN: f64 = 50.0;
-const TOO_FEW_PER_BIN: f64 = 2.0;
+pub(super) const FEW_PER_BIN: f64 = 50.0;
+pub(super) const TOO_FEW_PER_BIN: f64 = 2.0;
 /// χΔt above which splitting shows, and above which the covariance of a zone is lost in one step.
 const LARGE_EXCHANGE: f64 = 0.2;
 const TOO_LARGE_EXCHANGE: f64 = 2.0;
 /// Numerical dispersion of the bins against the physical one.
-const VISIBLE_DISPERSION: f64 = 0.02;
+pub(super) const VISIBLE_DISPERSION: f64 = 0.02;
 /// Standard deviation by which the bins spread in a run, against the extent, where nothing else disperses.
-const VISIBLE_SPREADING: f64 = 0.01;
+pub(super) const VISIBLE_SPREADING: f64 = 0.01;
 
 /// Works all limits out; diagnostics tell of those that are passed.
 pub fn check(
@@ -51,11 +53,14 @@ pub fn check(
     } else if plan.carries_mass() {
         diagnostics.extend(between_steps(scenario, draft));
     }
-    if plan.mixing.is_some() {
+    if plan.sees_bins() {
         particles_per_bin(scenario, plan, &mut limits, &mut diagnostics);
-        exchange(scenario, plan, &mut limits, &mut diagnostics);
+    }
+    exchange(scenario, plan, &mut limits, &mut diagnostics);
+    if plan.sees_bins() {
         numerical_dispersion(scenario, plan, &mut limits, &mut diagnostics);
     }
+    averaging_limits::check(scenario, plan, &mut limits, &mut diagnostics);
     exchange_limits::check(scenario, plan, &mut limits, &mut diagnostics);
     reaction_limits::check(scenario, plan, scales, &mut limits, &mut diagnostics);
     check_memory(scenario, plan, cost, memory, &mut diagnostics);

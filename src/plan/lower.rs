@@ -1,5 +1,6 @@
 //! Scenario to plan, literally: everything the scene says, nothing left out yet.
 
+use super::averaging::Averaging;
 use super::build_tape::build_reference;
 use super::evaluation::{self, Evaluation};
 use super::exchange::Exchange;
@@ -35,6 +36,7 @@ pub fn lower(scenario: &Scenario) -> Result<Lowered, Vec<Diagnostic>> {
     let network = lower_chemistry::network(scenario, &axes)?;
     let (transport, told) = lower_transport::transport(scenario, &axes, &network, decay)?;
     let exchange = lower_exchange::exchange(scenario, &axes, transport.as_ref())?;
+    let averaging = lower_exchange::averaging(scenario)?;
     let Network { species, components, chemistry, mut warnings, .. } = network;
     warnings.extend(told);
     let extent: f64 = axes.iter().map(|axis| axis.high - axis.low).product();
@@ -49,8 +51,8 @@ pub fn lower(scenario: &Scenario) -> Result<Lowered, Vec<Diagnostic>> {
         particles: particles(scenario, extent * porosity),
         species,
         components,
-        mixing: scenario.mixing.as_ref().map(lower_mixing),
-        stages: stages(exchange.as_ref()),
+        stages: stages(exchange.as_ref(), averaging.as_ref()),
+        mixing: scenario.mixing.as_ref().map(|mixing| lower_mixing(mixing, averaging)),
         exchange,
         reactions: scenario.reactions.iter().filter_map(lower_reaction).collect(),
         chemistry,
@@ -99,9 +101,12 @@ fn particles(scenario: &Scenario, water: f64) -> Particles {
 }
 
 /// A step as a scene without passes takes it.
-fn stages(exchange: Option<&Exchange>) -> Vec<Stage> {
-    let all = [Stage::Mix, Stage::Move, Stage::Bound, Stage::Exchange, Stage::Average, Stage::Observe];
-    all.into_iter().filter(|stage| *stage != Stage::Exchange || exchange.is_some()).collect()
+fn stages(exchange: Option<&Exchange>, averaging: Option<&Averaging>) -> Vec<Stage> {
+    let mut stages = vec![Stage::Mix, Stage::Move, Stage::Bound];
+    stages.extend(exchange.map(|_| Stage::Exchange));
+    stages.extend(averaging.map(|_| Stage::KernelMean));
+    stages.extend([Stage::Average, Stage::Observe]);
+    stages
 }
 
 /// Masses carry nothing beside their position, and walk by `transport` alone.
@@ -226,7 +231,7 @@ pub(super) fn too_large(span: crate::source::Span) -> Diagnostic {
         .expected("a smaller expression")
 }
 
-fn lower_mixing(mixing: &scenario::Mixing) -> Mixing {
+fn lower_mixing(mixing: &scenario::Mixing, averaging: Option<Averaging>) -> Mixing {
     let zone = |zone: &scenario::Zone| Zone {
         name: zone.name.clone(),
         fraction: zone.fraction,
@@ -236,6 +241,7 @@ fn lower_mixing(mixing: &scenario::Mixing) -> Mixing {
     Mixing {
         zones: mixing.zones.iter().map(zone).collect(),
         is_well_mixed: mixing.zones.iter().all(|zone| zone.rate.is_none()),
+        averaging,
     }
 }
 

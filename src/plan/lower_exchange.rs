@@ -3,6 +3,7 @@
 //! Owns the lowering and the look at profiles. May use the scenario and tapes. It deliberately judges no size: the
 //! limits do.
 
+use super::averaging::Averaging;
 use super::build_tape::build_tape;
 use super::exchange::{Exchange, Kernel, determinant, of_tape};
 use super::lower::too_large;
@@ -51,11 +52,7 @@ pub(super) fn exchange(
     };
     let kernel = match written.kernel.value {
         Choice::Catalogue(name) => Kernel::Catalogue(name.to_owned()),
-        Choice::Own(idx) => Kernel::Profile {
-            name: scenario.kernels[idx].name.clone(),
-            value: profiles.swap_remove(idx),
-            support: scenario.kernels[idx].support.value,
-        },
+        Choice::Own(idx) => own(scenario, idx, profiles.swap_remove(idx)),
     };
     let (diffusion, spreading) = match transport.map(|transport| varying(scenario, axes, transport, written))
     {
@@ -75,6 +72,27 @@ pub(super) fn exchange(
         normalisation: written.normalisation,
         integration: written.integration,
     }))
+}
+
+/// The means that zones exchange with; nothing where they are those of bins.
+pub(super) fn averaging(scenario: &Scenario) -> Result<Option<Averaging>, Vec<Diagnostic>> {
+    let Some(written) = &scenario.averaging else { return Ok(None) };
+    let Some(bandwidth) = build_tape(&written.bandwidth.value, &[]) else {
+        return Err(vec![too_large(written.bandwidth.span)]);
+    };
+    let kernel = match written.kernel.value {
+        Choice::Catalogue(name) => Kernel::Catalogue(name.to_owned()),
+        Choice::Own(idx) => {
+            own(scenario, idx, profile(&scenario.kernels[idx]).map_err(|problem| vec![*problem])?)
+        }
+    };
+    let (cutoff, normalisation) = (written.cutoff, written.normalisation);
+    Ok(Some(Averaging { kernel, bandwidth, cutoff, normalisation }))
+}
+
+fn own(scenario: &Scenario, idx: usize, value: Tape) -> Kernel {
+    let Written { name, support, .. } = &scenario.kernels[idx];
+    Kernel::Profile { name: name.clone(), value, support: support.value }
 }
 
 /// The part of the dispersion that walks.

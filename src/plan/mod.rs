@@ -4,6 +4,8 @@
 //! use the words, the catalogue and `scenario`. It deliberately runs nothing.
 
 mod auto_step;
+pub mod averaging;
+mod averaging_limits;
 pub mod build_tape;
 pub mod burnett_frind;
 mod check;
@@ -49,6 +51,7 @@ mod turns;
 pub use crate::scenario::{OutputKind, Placement, Side, Station};
 pub use compile::{Compiled, Options, Selection, compile, hash};
 
+use averaging::Averaging;
 use chemistry::Chemistry;
 use exchange::Exchange;
 use serde::{Deserialize, Serialize};
@@ -179,8 +182,18 @@ fn is_false(value: &bool) -> bool {
 pub struct Mixing {
     pub zones: Vec<Zone>,
     /// True if only instant zones exist: one unmixed carrier per component is stored (weight 0), and
-    /// every value is the bin mean of the carriers.
+    /// every value is the mean of the carriers.
     pub is_well_mixed: bool,
+    /// What zones exchange with, if it is not the mean of the bin. A parcel then stores its mean where a zone is instant.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub averaging: Option<Averaging>,
+}
+
+impl Mixing {
+    /// Whether every parcel stores the mean that it sees.
+    pub fn stores_mean(&self) -> bool {
+        self.averaging.is_some() && self.zones.iter().any(|zone| zone.rate == ZoneRate::Instant)
+    }
 }
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -315,6 +328,8 @@ pub enum Stage {
     Bound,
     /// Parcels exchange with those around them at the positions reached.
     Exchange,
+    /// Zones exchange with the means over the parcels around, at the positions reached.
+    KernelMean,
     /// Bin index of every particle, sums per bin, means.
     Average,
     /// Mix and React in one pass over memory, both of the step before.

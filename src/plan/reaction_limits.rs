@@ -194,7 +194,8 @@ fn noise_of_means(
 ) {
     let n_bins: f64 = plan.axes.iter().map(|axis| axis.bins as f64).product();
     let is_well_mixed = plan.mixing.as_ref().is_some_and(|mixing| mixing.is_well_mixed);
-    if !is_well_mixed || !plan.moves() || n_bins <= 1.0 {
+    let averaging = plan.mixing.as_ref().and_then(|mixing| mixing.averaging.as_ref());
+    if !is_well_mixed || !plan.moves() || n_bins <= 1.0 && averaging.is_none() {
         return;
     }
     let kinetics = plan.chemistry.as_ref().and_then(|chemistry| chemistry.kinetics.as_ref());
@@ -203,10 +204,14 @@ fn noise_of_means(
         return;
     }
     let of = |per_bin: f64| (std::f64::consts::FRAC_2_PI / per_bin).sqrt();
-    let value = of(plan.particles.count as f64 / n_bins);
+    let found = match averaging {
+        None => plan.particles.count as f64 / n_bins,
+        Some(averaging) => averaging.extents(plan).effective,
+    };
+    let value = of(found);
     limits.push(Limit {
-        name: "reactants that the noise of bin means keeps apart".into(),
-        formula: "sqrt(2 / (pi n)), n particles per bin",
+        name: "reactants that the noise of means keeps apart".into(),
+        formula: "sqrt(2 / (pi n)), n particles in a mean",
         value,
         advice: "at most, where reactants are in balance; below 0.03; falls with the root of the particles",
     });
@@ -214,6 +219,17 @@ fn noise_of_means(
         return;
     }
     let per_bin = std::f64::consts::FRAC_2_PI / (VISIBLE_NOISE * VISIBLE_NOISE);
+    if let Some(written) = &scenario.averaging {
+        let more = (plan.particles.count as f64 * per_bin / found).ceil();
+        diagnostics.push(
+            Diagnostic::warning(N107, "the noise of means keeps reactants apart")
+                .at(written.bandwidth.span, format!("means of {} parcels", short(found)))
+                .found(format!("up to {} of reactants in balance are left", short(value)))
+                .expected(format!("at most {VISIBLE_NOISE}"))
+                .help(format!("use at least {more} particles, or a larger bandwidth")),
+        );
+        return;
+    }
     let span = scenario.bins.as_ref().map_or(scenario.domain.span, |bins| bins.span);
     let affordable = (plan.particles.count as f64 / per_bin).floor();
     let fewer_bins =

@@ -44,6 +44,12 @@ pub(super) struct Statements<'a> {
     pub reports: Vec<(Span, &'a tree::Report)>,
 }
 
+impl Statements<'_> {
+    pub fn has_bins(&self) -> bool {
+        self.average.is_some_and(|(_, average)| average.bins.is_some())
+    }
+}
+
 /// Resolves a scene: everything that can be wrong is reported together.
 ///
 /// `sources` gains a file for each setting of the command line, so that messages can show it.
@@ -258,9 +264,7 @@ fn build<'a>(
     file: &'a tree::File,
     has_syntax_errors: bool,
 ) -> Option<Scenario> {
-    if !has_syntax_errors {
-        report_missing(checker, statements, file);
-    }
+    report_missing(checker, statements, file, has_syntax_errors);
     let parameters = parameters(checker, statements);
     let mut domain = super::geometry::domain(checker, statements);
     let species = super::model::species(checker, statements);
@@ -268,7 +272,7 @@ fn build<'a>(
     let chemistry = super::chemistry::chemistry(checker, statements);
     let motion = motion(checker, statements, domain.as_mut());
     let mixing = super::zones::mixing(checker, statements);
-    let exchange = super::exchange::exchange(checker, statements);
+    let exchanges = super::exchange::exchanges(checker, statements);
     let bins = super::geometry::bins(checker, statements);
     let particles = particles(checker, statements, domain.as_ref());
     let run = super::model::run(checker, statements);
@@ -290,7 +294,7 @@ fn build<'a>(
     if !(are_outputs_right && are_references_right && is_analysis_right) {
         return None;
     }
-    let ((medium, flow, dispersion), (exchange, kernels)) = (motion?, exchange?);
+    let ((medium, flow, dispersion), (exchange, kernels, averaging)) = (motion?, exchanges?);
     let scenario = Scenario {
         title: statements.title.map(|title| title.value.clone()),
         citations: statements.citations.iter().map(|text| text.value.clone()).collect(),
@@ -308,6 +312,7 @@ fn build<'a>(
         mixing: mixing?,
         exchange,
         kernels,
+        averaging,
         bins: bins?,
         particles: particles?,
         run: run?,
@@ -369,7 +374,15 @@ fn motion<'a>(
     are_sides_right.then_some((medium?, flow?, dispersion?))
 }
 
-fn report_missing<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>, file: &'a tree::File) {
+fn report_missing<'a>(
+    checker: &mut Checker<'a>,
+    statements: &Statements<'a>,
+    file: &'a tree::File,
+    has_syntax_errors: bool,
+) {
+    if has_syntax_errors {
+        return;
+    }
     let end = file.tokens.last().map_or(0, |token| token.span.end as usize);
     let place = Span::new(file.file, end, end);
     let wanted = [

@@ -1,4 +1,4 @@
-//! The statements `exchange` and `kernel`: what parcels exchange with those around them by.
+//! The statements `exchange` and `kernel`, and means by kernels: what parcels exchange with those around them by.
 //!
 //! Owns their words, ranges and defaults. May use the catalogue and the scenario's types. It deliberately works no
 //! length out: what a step and a number of particles make of them is for the plan.
@@ -10,7 +10,7 @@ use super::expression::{Expr, Node};
 use super::scope::{Locals, Origin};
 use super::slot::collect_names;
 use crate::catalog::kernel;
-use crate::diagnostic::codes::{D003, M002, M004};
+use crate::diagnostic::codes::{D003, M001, M002, M004};
 use crate::diagnostic::{Diagnostic, precise};
 use crate::source::{Span, Spanned};
 use crate::syntax::tree::{self, ExprKind};
@@ -31,6 +31,17 @@ pub struct Exchange {
     pub integration: Integration,
     pub cutoff: Cutoff,
     pub is_compensated: bool,
+}
+
+/// The means that zones exchange with, over the parcels around: `average kernel …`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Averaging {
+    pub span: Span,
+    pub kernel: Spanned<Choice>,
+    /// m, over [`WORDS_OF_LENGTH`], of which only the distance of parcels may be named.
+    pub bandwidth: Spanned<Expr>,
+    pub normalisation: Normalisation,
+    pub cutoff: Cutoff,
 }
 
 /// Whose kernel.
@@ -90,6 +101,8 @@ enum Word {
     Cutoff,
     Error,
     Compensate,
+    /// Of an average: read elsewhere.
+    Bins,
 }
 
 const WORDS: &[(&str, Word)] = &[
@@ -103,20 +116,77 @@ const WORDS: &[(&str, Word)] = &[
     ("compensate", Word::Compensate),
 ];
 
-/// The exchange of a scene, if it has one, and its kernels in the order of the text; `None` if something is wrong.
-pub(super) fn exchange<'a>(
+/// Of a mean over the parcels around: nothing disperses by it.
+const WORDS_OF_MEANS: &[(&str, Word)] = &[
+    ("kernel", Word::Kernel),
+    ("bandwidth", Word::Bandwidth),
+    ("normalise", Word::Normalise),
+    ("cutoff", Word::Cutoff),
+    ("bins", Word::Bins),
+];
+
+/// The exchange of a scene, if it has one, its kernels in the order of the text, and the means that zones exchange with;
+/// `None` if something is wrong.
+pub(super) fn exchanges<'a>(
     checker: &mut Checker<'a>,
     statements: &Statements<'a>,
-) -> Option<(Option<Exchange>, Vec<Kernel>)> {
+) -> Option<(Option<Exchange>, Vec<Kernel>, Option<Averaging>)> {
     let kernels: Vec<Option<Kernel>> =
         statements.kernels.iter().map(|written| own(checker, written)).collect();
-    let exchange = statement(checker, statements);
-    Some((exchange?, kernels.into_iter().collect::<Option<_>>()?))
+    let (exchange, averaging) = (statement(checker, statements), averaging(checker, statements));
+    Some((exchange?, kernels.into_iter().collect::<Option<_>>()?, averaging?))
 }
 
 /// `Some(None)` without the statement.
 fn statement<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> Option<Option<Exchange>> {
     let Some((span, fields)) = statements.exchange else { return Some(None) };
+    let words = ("a setting of an exchange", WORDS, &[0, 1][..]);
+    settings(checker, statements, (span, fields), words).map(|(found, _)| Some(found))
+}
+
+/// `Some(None)` without a mean over the parcels around.
+fn averaging<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> Option<Option<Averaging>> {
+    let Some((span, average)) = statements.average else { return Some(None) };
+    if average.settings.is_empty() {
+        return Some(None);
+    }
+    let words = ("a setting of an average", WORDS_OF_MEANS, &[1][..]);
+    let (found, seen) = settings(checker, statements, (span, &average.settings), words)?;
+    let place = average.settings.first().map_or(span, |field| field.name.span);
+    if !seen.contains(&Word::Bandwidth) {
+        checker.report(
+            Diagnostic::error(M001, "a mean over the parcels around has no bandwidth")
+                .at(place, "without a `bandwidth`")
+                .found("no `bandwidth`")
+                .expected("`bandwidth` and a length")
+                .help("add for example `bandwidth 3 * spacing`"),
+        );
+        return None;
+    }
+    if statements.zones.is_none() {
+        checker.report(
+            Diagnostic::error(M001, "nothing exchanges with a mean over the parcels around")
+                .at(place, "a kernel without `mixing zones`")
+                .found("no `mixing zones`")
+                .expected("a `mixing zones` statement")
+                .help("add zones, or leave all but `bins` out of `average`"),
+        );
+        return None;
+    }
+    let Exchange { kernel, bandwidth, normalisation, cutoff, .. } = found;
+    Some(Some(Averaging { span: place, kernel, bandwidth, normalisation, cutoff }))
+}
+
+/// What they are called, which there are, and which words of length a bandwidth may name.
+type Words<'w> = (&'w str, &'w [(&'w str, Word)], &'w [usize]);
+
+/// What fields of a statement set, and which of them stand there.
+fn settings<'a>(
+    checker: &mut Checker<'a>,
+    statements: &Statements<'a>,
+    (span, fields): (Span, &'a [tree::Field]),
+    (what, words, lengths): Words<'_>,
+) -> Option<(Exchange, Vec<Word>)> {
     let bandwidth = Expr::leaf(Node::Axis(0), Dimension::LENGTH, span);
     let mut found = Exchange {
         span,
@@ -128,22 +198,24 @@ fn statement<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> Opti
         cutoff: Cutoff::default(),
         is_compensated: true,
     };
-    let mut seen: Vec<(Word, &tree::Name)> = Vec::new();
+    let bins = statements.average.and_then(|(_, average)| average.bins.as_ref());
+    let bins = bins.filter(|_| words.iter().any(|(_, word)| *word == Word::Bins));
+    let mut seen: Vec<(Word, &tree::Name)> = bins.map(|(name, _)| (Word::Bins, name)).into_iter().collect();
     let mut is_right = true;
     for field in fields {
-        let word = checker.word(&field.name, "a setting of an exchange", WORDS);
+        let word = checker.word(&field.name, what, words);
         let first = seen.iter().find(|(earlier, _)| word.is_some_and(|word| excludes(*earlier, word)));
         if let Some((_, first)) = first {
-            report_twice(checker, &field.name, first);
+            report_twice(checker, &field.name, first, what);
         }
         let Some(word) = word.filter(|_| first.is_none()) else {
             is_right = false;
             continue;
         };
         seen.push((word, &field.name));
-        is_right &= set(checker, statements, field, word, &mut found).is_some();
+        is_right &= set(checker, statements, field, (word, lengths), &mut found).is_some();
     }
-    is_right.then_some(Some(found))
+    is_right.then(|| (found, seen.into_iter().map(|(word, _)| word).collect()))
 }
 
 /// Whether two settings say where one thing ends.
@@ -152,9 +224,10 @@ fn excludes(earlier: Word, word: Word) -> bool {
     earlier == word || (is_end(earlier) && is_end(word))
 }
 
-fn report_twice(checker: &mut Checker<'_>, name: &tree::Name, first: &tree::Name) {
+fn report_twice(checker: &mut Checker<'_>, name: &tree::Name, first: &tree::Name, what: &str) {
     let message = if name.value == first.value {
-        Diagnostic::error(M002, format!("a second `{}` of an exchange", name.value))
+        let whose = what.trim_start_matches("a setting of ");
+        Diagnostic::error(M002, format!("a second `{}` of {whose}", name.value))
             .found(format!("`{}` twice", name.value))
             .expected(format!("one `{}`", name.value))
     } else {
@@ -169,12 +242,12 @@ fn set<'a>(
     checker: &mut Checker<'a>,
     statements: &Statements<'a>,
     field: &'a tree::Field,
-    word: Word,
+    (word, lengths): (Word, &[usize]),
     found: &mut Exchange,
 ) -> Option<()> {
     match word {
         Word::Kernel => found.kernel = kernel_named(checker, statements, field)?,
-        Word::Bandwidth => found.bandwidth = bandwidth(checker, &field.value)?,
+        Word::Bandwidth => found.bandwidth = bandwidth(checker, &field.value, lengths)?,
         Word::Fraction => found.mixing_fraction = fraction(checker, &field.value)?,
         Word::Normalise => {
             found.normalisation = choice(checker, field, "a normalisation", NORMALISATIONS)?;
@@ -192,6 +265,7 @@ fn set<'a>(
         Word::Compensate => {
             found.is_compensated = choice(checker, field, "an answer", &[("on", true), ("off", false)])?;
         }
+        Word::Bins => {}
     }
     Some(())
 }
@@ -216,12 +290,15 @@ fn fraction<'a>(checker: &mut Checker<'a>, written: &'a tree::Expr) -> Option<f6
     Some(value.value)
 }
 
-/// A length, in which two words have a meaning that they have nowhere else.
-fn bandwidth<'a>(checker: &mut Checker<'a>, written: &'a tree::Expr) -> Option<Spanned<Expr>> {
-    are_free(checker, written)?;
+/// A length, in which some of two words have a meaning that they have nowhere else.
+fn bandwidth<'a>(
+    checker: &mut Checker<'a>,
+    written: &'a tree::Expr,
+    lengths: &[usize],
+) -> Option<Spanned<Expr>> {
+    are_free(checker, written, lengths)?;
     let length = |idx: usize| Expr::leaf(Node::Axis(idx), Dimension::LENGTH, written.span);
-    let locals: Locals =
-        WORDS_OF_LENGTH.iter().enumerate().map(|(idx, word)| ((*word).to_owned(), length(idx))).collect();
+    let locals: Locals = lengths.iter().map(|&idx| (WORDS_OF_LENGTH[idx].to_owned(), length(idx))).collect();
     checker.checked.insert(written.span, written);
     let value = checker.check_with(written, Allow::CONSTANT, &locals)?;
     let what = "the bandwidth";
@@ -234,12 +311,13 @@ fn bandwidth<'a>(checker: &mut Checker<'a>, written: &'a tree::Expr) -> Option<S
 }
 
 /// A name of the scene would be hidden by what it means in a bandwidth.
-fn are_free(checker: &mut Checker<'_>, written: &tree::Expr) -> Option<()> {
+fn are_free(checker: &mut Checker<'_>, written: &tree::Expr, lengths: &[usize]) -> Option<()> {
     let mut names = Vec::new();
     collect_names(written, &mut names);
-    let hidden = WORDS_OF_LENGTH.iter().find_map(|word| {
+    let hidden = lengths.iter().find_map(|&idx| {
+        let word = WORDS_OF_LENGTH[idx];
         let entry = checker.scope.get(word).filter(|_| names.iter().any(|name| name == word))?;
-        Some((*word, entry.origin.describe(), entry.span))
+        Some((word, entry.origin.describe(), entry.span))
     });
     let Some((word, what, defined)) = hidden else { return Some(()) };
     if let Some(entry) = checker.scope.get_mut(word) {

@@ -125,14 +125,15 @@ pub(super) fn check_volume(checker: &mut Checker<'_>, domain: &Domain, particles
     checker.require(is_right, what, found, SIZE, place);
 }
 
-/// `Some(None)`: there is no `average` statement.
+/// `Some(None)`: there is no `average` statement, or none with bins.
 pub(super) fn bins<'a>(
     checker: &mut Checker<'a>,
     statements: &Statements<'a>,
 ) -> Option<Option<Spanned<Vec<usize>>>> {
     let Some((span, statement)) = statements.average else { return Some(None) };
-    checker.word(&statement.kind, "a kind of average", &[("bins", ())])?;
-    grid(checker, &statement.counts, "the number of bins", span).map(Some)
+    let Some((kind, counts)) = &statement.bins else { return Some(None) };
+    checker.word(kind, "a kind of average", &[("bins", ())])?;
+    grid(checker, counts, "the number of bins", span).map(Some)
 }
 
 /// One number of bins: written, or a dimensionless constant.

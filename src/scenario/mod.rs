@@ -97,6 +97,8 @@ pub struct Scenario {
     pub exchange: Option<exchange::Exchange>,
     /// The scene's own kernels.
     pub kernels: Vec<exchange::Kernel>,
+    /// What zones exchange with, if it is not the mean of a bin.
+    pub averaging: Option<exchange::Averaging>,
     /// Bins of the averages, one count per axis of the domain.
     pub bins: Option<Spanned<Vec<usize>>>,
     pub particles: Particles,

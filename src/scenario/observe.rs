@@ -243,7 +243,7 @@ fn output_bins<'a>(
     }
     let Some(average) = average else {
         // A wrong `average` has been reported already.
-        if statements.average.is_none() {
+        if !statements.has_bins() {
             let message = Diagnostic::error(M001, format!("`{}` needs bins", kind.word())).found("no bins");
             checker.report(if kind == OutputKind::Mixing {
                 message

@@ -44,8 +44,11 @@ impl Replaced {
                         ExprKind::Tuple(parts) => parts,
                         _ => vec![value],
                     };
-                    let written = statements.average.map(|(_, average)| average.clone());
-                    replaced.average = written.map(|written| tree::Average { counts, ..written });
+                    let mut written = statements.average.map(|(_, average)| average.clone());
+                    if let Some((_, places)) = written.as_mut().and_then(|written| written.bins.as_mut()) {
+                        *places = counts;
+                    }
+                    replaced.average = written;
                 }
             }
         }

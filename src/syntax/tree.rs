@@ -111,7 +111,7 @@ pub enum StatementKind {
     Exchange(Vec<Field>),
     /// `kernel W(q) = (1 - q/2)^4 * (1 + 2*q) support 2 "doc"`
     Kernel(Kernel),
-    /// `average bins 300` or `average bins 100 x 50`
+    /// `average bins 300`, `average bins 100 x 50` or `average kernel gaussian, bandwidth 2 mm`
     Average(Average),
     /// `initial A = …, B = …`
     Initial(Vec<Assignment>),
@@ -246,10 +246,10 @@ pub struct Field {
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Average {
-    /// `bins`
-    pub kind: Name,
-    /// A number each, or a name of a dimensionless parameter.
-    pub counts: Vec<Expr>,
+    /// `bins 300`: a number each, or a dimensionless constant.
+    pub bins: Option<(Name, Vec<Expr>)>,
+    /// `kernel gaussian`, `bandwidth 2 mm`, …
+    pub settings: Vec<Field>,
 }
 
 /// `A = …`

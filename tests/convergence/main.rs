@@ -45,8 +45,11 @@ fn added_by_bins(bins: usize) -> Estimate {
         let axes = vec![axis(0, -10.0, 10.0, Side::Periodic, bins)];
         let mut plan = Plan { seed, ..plain(axes, walk(1, dispersion), n_particles, duration, 0.1) };
         plan.components[0].initial = step_down(0);
-        plan.mixing =
-            Some(Mixing { zones: vec![zone("all", 1.0, ZoneRate::Finite(1.0))], is_well_mixed: false });
+        plan.mixing = Some(Mixing {
+            zones: vec![zone("all", 1.0, ZoneRate::Finite(1.0))],
+            is_well_mixed: false,
+            averaging: None,
+        });
         plan.outputs = vec![all_particles(&plan, vec![duration])];
         match &run(&plan).1[0].values {
             Values::Particles { positions, concentrations } => {

@@ -80,7 +80,7 @@ fn a_stored_instant_zone_changes_nothing() {
     }
     let mut plan = line();
     let zones = vec![zone("fast", 0.4, ZoneRate::Instant), zone("other", 0.6, ZoneRate::Instant)];
-    plan.mixing = Some(Mixing { zones, is_well_mixed: true });
+    plan.mixing = Some(Mixing { zones, is_well_mixed: true, averaging: None });
     let dropped = text(&run(&plan).1);
     plan.mixing.as_mut().unwrap().zones[1].is_stored = true;
     assert!(text(&run(&plan).1) == dropped);

@@ -22,7 +22,7 @@ fn with(mixing: Option<Mixing>) -> Plan {
 }
 
 fn well_mixed() -> Mixing {
-    Mixing { zones: vec![zone("fast", 1.0, ZoneRate::Instant)], is_well_mixed: true }
+    Mixing { zones: vec![zone("fast", 1.0, ZoneRate::Instant)], is_well_mixed: true, averaging: None }
 }
 
 /// ∫c̄_AB = 2√(Dt/π). The position of the front's particles scatters the product by less than
@@ -47,7 +47,7 @@ fn instant_exchange_is_well_mixed() {
 #[test]
 fn fast_exchange_tends_to_well_mixed() {
     let zones = vec![zone("slow", 1.0, ZoneRate::Finite(1e3))];
-    let (_, snapshots) = run(&with(Some(Mixing { zones, is_well_mixed: false })));
+    let (_, snapshots) = run(&with(Some(Mixing { zones, is_well_mixed: false, averaging: None })));
     // Means are passed on every step: D_num = Δ²/(12Δt) = 1.7e-8 of 1.3e-7 m²/s, 6 % of the product.
     let expected = 2.0 * ((D + 1e-6 / 60.0) * T / std::f64::consts::PI).sqrt() * 100.0;
     assert!((product(&snapshots) / expected - 1.0).abs() < 0.04, "{} {expected}", product(&snapshots));
@@ -56,7 +56,7 @@ fn fast_exchange_tends_to_well_mixed() {
 #[test]
 fn without_exchange_nothing_reacts() {
     let zones = vec![zone("slow", 1.0, ZoneRate::Finite(0.0))];
-    for mixing in [None, Some(Mixing { zones, is_well_mixed: false })] {
+    for mixing in [None, Some(Mixing { zones, is_well_mixed: false, averaging: None })] {
         let (outcome, snapshots) = run(&with(mixing));
         assert_eq!(product(&snapshots), 0.0);
         assert_eq!(outcome.mass_defect, [0.0]);

@@ -62,7 +62,7 @@ fn several_zones_add_up() {
         zone("slow", etas[0], ZoneRate::Finite(chis[0])),
         zone("slower", etas[1], ZoneRate::Finite(chis[1])),
     ];
-    plan.mixing = Some(Mixing { zones, is_well_mixed: false });
+    plan.mixing = Some(Mixing { zones, is_well_mixed: false, averaging: None });
     plan.outputs =
         vec![output(OutputKind::Mixing, vec![Quantity::Pair(0, 1)], vec![200], vec![100.0, 300.0])];
     let (outcome, snapshots) = run(&plan);
@@ -112,7 +112,11 @@ fn bins_disperse_as_predicted() {
     let axes = vec![axis(0, -10.0, 10.0, Side::Periodic, bins)];
     let mut plan = plain(axes, walk(1, dispersion), 1_000_000, duration, 0.1);
     plan.components[0].initial = gaussian(1.0);
-    plan.mixing = Some(Mixing { zones: vec![zone("all", 1.0, ZoneRate::Finite(chi))], is_well_mixed: false });
+    plan.mixing = Some(Mixing {
+        zones: vec![zone("all", 1.0, ZoneRate::Finite(chi))],
+        is_well_mixed: false,
+        averaging: None,
+    });
     plan.outputs = vec![all_particles(&plan, vec![0.0, duration])];
     let (_, snapshots) = run(&plan);
     let variances: Vec<f64> = snapshots

@@ -40,7 +40,8 @@ fn both(mixing: Option<Mixing>, species: usize) -> (f64, f64) {
 /// χt = 0.12 it is small.
 #[test]
 fn standard_errors_are_the_scatter_of_replicates() {
-    let well_mixed = Mixing { zones: vec![zone("all", 1.0, ZoneRate::Instant)], is_well_mixed: true };
+    let well_mixed =
+        Mixing { zones: vec![zone("all", 1.0, ZoneRate::Instant)], is_well_mixed: true, averaging: None };
     let cases = [
         ("no zones, A", None, 0),
         ("no zones, AB", None, 2),

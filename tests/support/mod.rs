@@ -45,7 +45,7 @@ pub fn zone(name: &str, fraction: f64, rate: ZoneRate) -> Zone {
 
 pub fn dual_rate(eta: f64, chi: f64) -> Option<Mixing> {
     let zones = vec![zone("fast", 1.0 - eta, ZoneRate::Instant), zone("slow", eta, ZoneRate::Finite(chi))];
-    Some(Mixing { zones, is_well_mixed: false })
+    Some(Mixing { zones, is_well_mixed: false, averaging: None })
 }
 
 pub fn output(kind: OutputKind, quantities: Vec<Quantity>, bins: Vec<usize>, times: Vec<f64>) -> Output {

@@ -14,7 +14,7 @@ const WHOLE: f64 = 1.0 + 1e-12;
 const RESIDUAL: f64 = 1e-14;
 const MOST_ITERATIONS: usize = 10_000;
 
-/// Rest of the exponential series.
+/// Rest of the exponential series, of all that a step does.
 const REST: f64 = 1e-16;
 
 /// Takes columns through a step that exchanges the share `beta`.
@@ -27,7 +27,7 @@ pub fn step<const D: usize>(
     match integration {
         Integration::Explicit => explicit(operator, beta, columns),
         Integration::Implicit => implicit(operator, beta, columns),
-        Integration::Exponential => exponential(operator, beta, columns),
+        Integration::Exponential => exponential(operator, (beta, REST), columns),
     }
 }
 
@@ -119,10 +119,14 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 ///
 /// - Equation: `e^{−βL} = Σ_k e^{−Λ} Λ^k/k! P^k`, `P = 1 − L β/Λ`, `Λ = β max_i Σ_{j≠i} w_ij`.
 /// - Symbols: `P` has no negative entry and sums of one.
-/// - Range: any β; `Λ + 8 √Λ` sums. No value gets beyond the others.
+/// - Range: any β; `Λ + 8 √Λ` sums, up to a rest of the series. No value gets beyond the others.
 /// - Source: A. Jensen 1953, Scand. Actuar. J. 1953, 87, doi:10.1080/03461238.1953.10419459 (uniformisation).
 /// - Shape: columns in place.
-fn exponential<const D: usize>(operator: &Operator<D>, beta: f64, columns: &mut [Vec<f64>]) {
+pub fn exponential<const D: usize>(
+    operator: &Operator<D>,
+    (beta, rest): (f64, f64),
+    columns: &mut [Vec<f64>],
+) {
     let (n_columns, n) = (columns.len(), columns.first().map_or(0, Vec::len));
     let mut found = zeros(n_columns + 1, n);
     operator.differences(columns, &mut found);
@@ -136,7 +140,10 @@ fn exponential<const D: usize>(operator: &Operator<D>, beta: f64, columns: &mut 
     columns.iter_mut().flatten().for_each(|value| *value *= weight);
     let most = scale + 12.0 * scale.sqrt() + 40.0;
     let mut k = 0.0;
-    while k < most && left > REST {
+    while k < most && left > rest {
+        if k > 0.0 {
+            operator.differences(&power, &mut found[..n_columns]);
+        }
         k += 1.0;
         for (power, change) in power.iter_mut().zip(&found) {
             power.iter_mut().zip(change).for_each(|(value, change)| *value += beta / scale * change);
@@ -146,7 +153,6 @@ fn exponential<const D: usize>(operator: &Operator<D>, beta: f64, columns: &mut 
         for (value, power) in columns.iter_mut().flatten().zip(power.iter().flatten()) {
             *value += weight * power;
         }
-        operator.differences(&power, &mut found[..n_columns]);
     }
     // What rounding and the end of the series left out belongs to the last one: sums stay what they were.
     let rest = left.max(0.0);

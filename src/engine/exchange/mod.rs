@@ -9,6 +9,7 @@ mod in_run;
 mod integrate;
 mod local;
 mod matrix;
+mod mean;
 mod near;
 mod operator;
 mod own_kernels;
@@ -28,8 +29,10 @@ use around::Around;
 use crowd::{MOST_BLOCKS, Sorted};
 use local::Local;
 use near::Near;
-use operator::{Operator, Profile};
+use operator::{Operator, Profile, Weights};
 use space::Space;
+
+pub use in_run::Exchanges;
 
 /// What lives as long as the run.
 pub struct Exchange<const D: usize> {
@@ -74,27 +77,30 @@ impl<const D: usize> Exchange<D> {
         let plan = program.plan;
         let Some(planned) = &plan.exchange else { return Ok(None) };
         planned.check(D).map_err(|reason| unsound(&reason))?;
-        let dt = plan.time.step.min(plan.time.duration);
-        let sizes = planned.sizes(plan, dt);
+        let local = Local::new(plan, planned, settings)?;
+        Self::of(plan, planned.clone(), local).map(Some)
+    }
+
+    fn of(plan: &Plan, planned: Planned, local: Option<Local<D>>) -> Result<Self, RunError> {
+        let sizes = planned.sizes(plan, plan.time.step.min(plan.time.duration));
         let size = (sizes.bandwidth, sizes.radius);
-        let axes = closed(plan);
-        let space = Space::new(&axes, &planned.diffusion, size, plan.particles.count)
+        let space = Space::new(&closed(plan), &planned.diffusion, size, plan.particles.count)
             .filter(|_| sizes.share.is_finite() && sizes.bandwidth > 0.0)
             .ok_or_else(|| unsound("an exchange without dispersion or bandwidth"))?;
         let profile =
-            Profile::new(planned).ok_or_else(|| unsound("an exchange by a kernel that does not exist"))?;
-        Ok(Some(Self {
-            planned: planned.clone(),
+            Profile::new(&planned).ok_or_else(|| unsound("an exchange by a kernel that does not exist"))?;
+        Ok(Self {
+            planned,
             sizes,
             space,
-            local: Local::new(plan, planned, settings)?,
+            local,
             profile,
             sorted: Sorted::default(),
             factors: Vec::new(),
             columns: Vec::new(),
             lists: Pool::new(),
             own_lists: Pool::new(),
-        }))
+        })
     }
 
     /// The same, to go another way from here.
@@ -122,9 +128,6 @@ impl<const D: usize> Exchange<D> {
         (dt, width): (f64, Width),
         limits: &[f64],
     ) -> Result<Option<Wrong>, RunError> {
-        if blocks.len() >= MOST_BLOCKS {
-            return Err(unsound("an exchange of more than four thousand million parcels"));
-        }
         let n_slots = program.roles.len();
         // What is a mean is made anew, not exchanged.
         let is_exchanged = |column: &usize| !matches!(program.roles[column % n_slots], Role::Mean);
@@ -133,6 +136,23 @@ impl<const D: usize> Exchange<D> {
             return Ok(None);
         }
         self.look(program, blocks, (dt, width))?;
+        let (beta, integration) = (self.beta(dt), self.planned.integration);
+        self.on_columns(blocks, (&carried, Weights::Forces, width), &mut |operator, columns| {
+            integrate::step(operator, integration, beta, columns);
+        })?;
+        Ok(self.give_back(blocks, &carried, (limits, n_slots)))
+    }
+
+    /// Sorts parcels, makes weights, and lets columns of theirs be worked on in the order of cells.
+    fn on_columns(
+        &mut self,
+        blocks: &[Block<D>],
+        (carried, weights, width): (&[usize], Weights, Width),
+        work: &mut dyn FnMut(&mut Operator<D>, &mut [Vec<f64>]),
+    ) -> Result<(), RunError> {
+        if blocks.len() >= MOST_BLOCKS {
+            return Err(unsound("an exchange of more than four thousand million parcels"));
+        }
         // Of parcels that stand where they stood, all but the values is known; kernels may hang on the length of a step.
         let is_at_rest = self.local.is_none() && self.sorted.stands(&self.space, blocks);
         if !is_at_rest {
@@ -142,16 +162,15 @@ impl<const D: usize> Exchange<D> {
             local.sort(&self.sorted);
         }
         self.columns.resize_with(carried.len(), Vec::new);
-        for (values, &column) in self.columns.iter_mut().zip(&carried) {
+        for (values, &column) in self.columns.iter_mut().zip(carried) {
             self.sorted.gather(blocks, column, values);
         }
-        let crowd = self.sorted.crowd(&self.space);
-        let beta = self.beta(dt);
         let mut operator = Operator {
-            crowd,
+            crowd: self.sorted.crowd(&self.space),
             metrics: self.local.as_ref().and_then(Local::metrics),
             profile: &self.profile,
             normalisation: self.planned.normalisation,
+            weights,
             width,
             lists: &self.lists,
             own_lists: &self.own_lists,
@@ -161,16 +180,26 @@ impl<const D: usize> Exchange<D> {
         if !is_at_rest {
             operator.weigh();
         }
-        integrate::step(&mut operator, self.planned.integration, beta, &mut self.columns);
+        work(&mut operator, &mut self.columns);
         self.factors = operator.factors;
+        Ok(())
+    }
+
+    /// Columns go back to their blocks; the first value that is below its limit, or no number, is told.
+    fn give_back(
+        &self,
+        blocks: &mut [Block<D>],
+        carried: &[usize],
+        (limits, n_slots): (&[f64], usize),
+    ) -> Option<Wrong> {
         let mut wrong = None;
-        for (values, &column) in self.columns.iter().zip(&carried) {
+        for (values, &column) in self.columns.iter().zip(carried) {
             let found = self.sorted.give_back(blocks, column, values, limits[column / n_slots]);
             if let Some((block, at)) = found.filter(|_| wrong.is_none()) {
                 wrong = Some(Wrong { column, block, at });
             }
         }
-        Ok(wrong)
+        wrong
     }
 
     /// Kernels and cells for where parcels are, if they differ from place to place.

@@ -54,6 +54,15 @@ impl Profile {
     }
 }
 
+/// What two parcels exchange by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Weights {
+    /// `−W′/q`: what disperses as a kernel does.
+    Forces,
+    /// `W`: parts of a mean.
+    Values,
+}
+
 /// Everything that the weights of one set of positions are made of.
 pub struct Operator<'a, const D: usize> {
     pub crowd: Crowd<'a, D>,
@@ -61,6 +70,7 @@ pub struct Operator<'a, const D: usize> {
     pub metrics: Option<Metrics<'a>>,
     pub profile: &'a Profile,
     pub normalisation: Normalisation,
+    pub weights: Weights,
     pub width: Width,
     pub lists: &'a Pool<Near<D>>,
     pub own_lists: &'a Pool<Around>,
@@ -229,7 +239,10 @@ impl<const D: usize, K: Radial> OnPortion<'_, '_, D, K> {
                 near.difference(0, 0.0, &mut lanes[0]);
             }
             Wanted::Differences(columns) => {
-                near.force(kernel, square);
+                match operator.weights {
+                    Weights::Forces => near.force(kernel, square),
+                    Weights::Values => near.weigh(kernel, square),
+                }
                 let first = operator.normalise(near, idx);
                 for column in 0..columns.len() {
                     near.difference(first + column, columns[column][idx], &mut lanes[column]);
@@ -246,7 +259,10 @@ impl<const D: usize, K: Radial> OnPortion<'_, '_, D, K> {
     fn leave_out_itself(&mut self, first: usize, at: usize, n_targets: usize) {
         let Wanted::Differences(columns) = self.wanted else { return };
         if self.targets.len() > columns.len() {
-            let force = self.kernel.force(0.0);
+            let force = match self.operator.weights {
+                Weights::Forces => self.kernel.force(0.0),
+                Weights::Values => self.kernel.value(0.0),
+            };
             for target in 0..n_targets {
                 let own = self.operator.own_weight(force, first + target);
                 self.targets[columns.len()][at + target] -= own;

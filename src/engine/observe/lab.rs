@@ -247,7 +247,7 @@ pub fn resolve<const D: usize>(
     for component in 0..program.n_components() {
         let columns = &lab.columns[component * n_slots..][..n_slots];
         if needs.simulated {
-            weighted(&program.mean_weights, columns, &mut lab.simulated[component][..n]);
+            weighted(&program.seen_weights, columns, &mut lab.simulated[component][..n]);
         }
         if needs.mixed && !lab.is_mixed_known {
             let own = &lab.simulated[component][..n];

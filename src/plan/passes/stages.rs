@@ -15,17 +15,11 @@ pub(super) fn run(draft: &mut Draft) {
     let mixes = exchanges(plan);
     let reacts = plan.reacts_in_steps();
     // Then no particle reacts before the means of all are known.
-    let is_coupled = reacts && (plan.mixing.is_some() || plan.has_immobile());
+    let is_coupled = reacts && plan.hangs_on_bins();
+    let averages = plan.has_kernel_mean();
     let observes = !plan.outputs.is_empty();
     let mut notes = Vec::new();
-    if plan.mixing.is_none() && !is_coupled {
-        notes.push(("mixing and averages in a step", "no mixing zones"));
-    } else if !mixes && !is_coupled {
-        notes.push((
-            "mixing and averages in a step",
-            "no zone with a finite rate: means are taken at outputs only",
-        ));
-    }
+    notes.extend(of_means(plan, mixes, is_coupled).map(|why| ("mixing and averages in a step", why)));
     if !moves {
         notes.push(("moving particles", why_still(plan)));
     }
@@ -45,11 +39,11 @@ pub(super) fn run(draft: &mut Draft) {
         let why = "first-order with constant rates: transport and reaction commute, exact for any step";
         notes.push(("reaction in a step", why));
     }
-    if plan.exchange.is_none() {
+    if plan.exchange.is_none() && !averages {
         notes.push(("neighbour search", "no kernel interaction"));
     }
     let mut stages = match (moves, mixes) {
-        _ if plan.exchange.is_some() => with_exchange(plan, is_coupled),
+        _ if plan.exchange.is_some() || averages => with_neighbours(plan, is_coupled),
         // Parcels that come and go are no pass over memory: each stage has its own.
         _ if is_tracked && is_coupled => vec![Stage::FusedReact, Stage::Move, Stage::Average],
         _ if is_tracked && reacts => vec![Stage::React, Stage::Move],
@@ -73,6 +67,16 @@ pub(super) fn run(draft: &mut Draft) {
     }
 }
 
+/// Why a step takes no means of bins, if it does not.
+fn of_means(plan: &Plan, mixes: bool, is_coupled: bool) -> Option<&'static str> {
+    match &plan.mixing {
+        _ if is_coupled || mixes => None,
+        None => Some("no mixing zones"),
+        Some(_) if plan.has_kernel_mean() => Some("zones exchange with means over the parcels around"),
+        Some(_) => Some("no zone with a finite rate: means are taken at outputs only"),
+    }
+}
+
 fn why_still(plan: &Plan) -> &'static str {
     match plan.exchange {
         None => "neither flow in the frame nor dispersion",
@@ -81,7 +85,7 @@ fn why_still(plan: &Plan) -> &'static str {
 }
 
 /// Parcels know their neighbours only when all have moved: nothing is joined with what comes after.
-fn with_exchange(plan: &Plan, is_coupled: bool) -> Vec<Stage> {
+fn with_neighbours(plan: &Plan, is_coupled: bool) -> Vec<Stage> {
     let (mixes, reacts) = (exchanges(plan), plan.reacts_in_steps());
     let mut stages = match (mixes, reacts) {
         (true, true) => vec![Stage::FusedReact],
@@ -96,15 +100,16 @@ fn with_exchange(plan: &Plan, is_coupled: bool) -> Vec<Stage> {
     if plan.moves() && plan.transport.is_none() {
         stages.push(Stage::Bound);
     }
-    stages.push(Stage::Exchange);
+    stages.extend(plan.exchange.as_ref().map(|_| Stage::Exchange));
+    stages.extend(plan.has_kernel_mean().then_some(Stage::KernelMean));
     if mixes || is_coupled {
         stages.push(Stage::Average);
     }
     stages
 }
 
-/// Whether any zone moves towards the mean at a finite rate.
+/// Whether any zone moves towards the mean of its bin at a finite rate.
 fn exchanges(plan: &Plan) -> bool {
-    let Some(mixing) = &plan.mixing else { return false };
+    let Some(mixing) = plan.mixing.as_ref().filter(|_| plan.sees_bins()) else { return false };
     mixing.zones.iter().any(|zone| matches!(zone.rate, ZoneRate::Finite(rate) if rate > 0.0))
 }

@@ -11,13 +11,14 @@ pub(super) fn run(draft: &mut Draft) {
     for zone in empty {
         notes.push((format!("zone `{}`", zone.name), "its fraction is zero".to_owned()));
     }
+    let why = match mixing.averaging {
+        None => "instant: always at the mean of its bin",
+        Some(_) => "instant: always at the mean, which a particle stores once",
+    };
     for zone in &mut zones {
         if zone.rate == ZoneRate::Instant && zone.is_stored {
             zone.is_stored = false;
-            notes.push((
-                format!("values of zone `{}` on particles", zone.name),
-                "instant: always at the mean of its bin".to_owned(),
-            ));
+            notes.push((format!("values of zone `{}` on particles", zone.name), why.to_owned()));
         }
     }
     mixing.is_well_mixed = zones.iter().all(|zone| zone.rate == ZoneRate::Instant);

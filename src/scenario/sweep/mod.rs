@@ -161,7 +161,7 @@ pub(super) fn sweeps<'a>(
             continue;
         }
         let sweep = sweep(checker, *span, written, parameters, measures);
-        if statements.average.is_none() {
+        if !statements.has_bins() {
             bins_of_nothing(checker, sweep.as_ref());
         }
         list.extend(sweep);

@@ -3,8 +3,8 @@
 //! Owns the walk. May use the tree. It deliberately knows no meaning: who visits says what to do.
 
 use crate::syntax::tree::{
-    Assignment, Axis, Change, ChangeTimes, Count, DarcyEntry, DarcyKind, Dispersion, Expr, ExprKind, Field,
-    FileValue, FlowArgument, Name, Output, Place, Range, Rate, RegionArgument, Source, StatementKind,
+    Assignment, Average, Axis, Change, ChangeTimes, Count, DarcyEntry, DarcyKind, Dispersion, Expr, ExprKind,
+    Field, FileValue, FlowArgument, Name, Output, Place, Range, Rate, RegionArgument, Source, StatementKind,
     SweepAxis, SweepEntry, SweepValue, Times,
 };
 
@@ -55,7 +55,7 @@ pub(super) fn visit(kind: &mut StatementKind, visitor: &mut impl Visitor) {
             let fields = zones.iter_mut().flat_map(|zone| &mut zone.fields);
             fields.for_each(|it| expression(&mut it.value, visitor));
         }
-        StatementKind::Average(it) => expressions(&mut it.counts, visitor),
+        StatementKind::Average(it) => average(it, visitor),
         StatementKind::Initial(list) => assignments(list, visitor),
         StatementKind::Particles(it) => match &mut it.count {
             Count::All(it) => expression(it, visitor),
@@ -132,6 +132,11 @@ fn transport(kind: &mut StatementKind, visitor: &mut impl Visitor) {
         StatementKind::Source(it) => source(it, visitor),
         _ => {}
     }
+}
+
+fn average(it: &mut Average, visitor: &mut impl Visitor) {
+    it.bins.iter_mut().for_each(|(_, counts)| expressions(counts, visitor));
+    fields(&mut it.settings, visitor);
 }
 
 fn fields(list: &mut [Field], visitor: &mut impl Visitor) {

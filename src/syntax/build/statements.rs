@@ -11,8 +11,8 @@ use crate::syntax::climb::Built;
 use crate::syntax::grammar::Rule;
 use crate::syntax::tree::{
     self, Arrow, Assignment, Average, Axis, Count, Domain, Expr, ExprKind, Field, Function, Kernel, Let,
-    Measure, Output, Param, Particles, Qualifier, Rate, Reaction, Reference, Run, Species, StatementKind,
-    Target, Term, Times, UnaryOperator, Use, Zone,
+    Measure, Name, Output, Param, Particles, Qualifier, Rate, Reaction, Reference, Run, Species,
+    StatementKind, Target, Term, Times, UnaryOperator, Use, Zone,
 };
 use pest::iterators::Pair;
 
@@ -48,9 +48,7 @@ pub fn kind(mut parts: Parts, rule: Rule) -> Built<StatementKind> {
         Rule::mixing => S::MixingZones(each(parts, Rule::zone, zone)?),
         Rule::exchange => S::Exchange(each(parts, Rule::exchange_setting, field)?),
         Rule::kernel => S::Kernel(kernel(parts)?),
-        Rule::average => {
-            S::Average(Average { kind: parts.wrapped_name(Rule::kind)?, counts: counts(parts)? })
-        }
+        Rule::average => S::Average(average(parts)?),
         Rule::initial => S::Initial(each(parts, Rule::assignment, assignment)?),
         Rule::particles => S::Particles(particles(parts)?),
         Rule::run => S::Run(run(parts)?),
@@ -62,6 +60,36 @@ pub fn kind(mut parts: Parts, rule: Rule) -> Built<StatementKind> {
         Rule::report => S::Report(sweeps::report(parts)?),
         _ => S::Sweep(sweeps::sweep(parts)?),
     })
+}
+
+/// The word in front of bins; a setting may stand in their place.
+const BINS: &str = "bins";
+
+fn average(parts: &mut Parts) -> Built<Average> {
+    let mut average = Average { bins: None, settings: Vec::new() };
+    for (name, mut values) in each(parts, Rule::average_part, average_part)? {
+        // The grammar takes a word or a number for a count.
+        match values.pop() {
+            Some(value) if values.is_empty() && (name.value != BINS || average.bins.is_some()) => {
+                average.settings.push(Field { name, value });
+            }
+            last => {
+                values.extend(last);
+                average.bins = Some((name, values));
+            }
+        }
+    }
+    Ok(average)
+}
+
+fn average_part(parts: &mut Parts) -> Built<(Name, Vec<Expr>)> {
+    if let Some(pair) = parts.take(Rule::kind) {
+        let name = Parts::of(parts.place, pair).name()?;
+        return Ok((name, counts(parts)?));
+    }
+    let pair = parts.need(Rule::exchange_setting)?;
+    let Field { name, value } = field(&mut Parts::of(parts.place, pair))?;
+    Ok((name, vec![value]))
 }
 
 /// All following parts of one rule, each built by `build`.

@@ -91,7 +91,7 @@ pub fn expected_words(rule: Rule) -> Vec<String> {
         }
         R::reactants | R::products | R::target_kind | R::share => one("a name"),
         R::kind | R::output_kind | R::shape | R::boundary_kind => one("a kind"),
-        R::setting | R::chemistry_setting | R::exchange_setting => one("a setting"),
+        R::setting | R::chemistry_setting | R::exchange_setting | R::average_part => one("a setting"),
         R::rate | R::signed_number | R::corner | R::region_argument | R::sweep_value | R::progression => {
             one(VALUE)
         }
