@@ -1,7 +1,7 @@
 //! What a run will cost: time from a table of measured stage costs, memory from the state.
 
 use super::chemistry::{Chemistry, Method};
-use super::exchange::Exchange;
+use super::exchange::{Exchange, MOST_PAIR_BYTES};
 use super::integrator::Expected;
 use super::time_scales::TimeScales;
 use super::transport::{Flow, Transport};
@@ -141,7 +141,8 @@ pub fn estimate(plan: &Plan, scales: Option<&TimeScales>) -> Cost {
         + (table::OBSERVE_BIN + table::WRITE_ROW) * n_binned;
     let n_bins: f64 = plan.axes.iter().map(|axis| axis.bins as f64).product();
     Cost {
-        state_bytes: (8.0 * n_particles * (n_axes + n_values + own_values(plan, n_values))) as u64,
+        state_bytes: (8.0 * n_particles * (n_axes + n_values + own_values(plan, n_values)) + pair_bytes(plan))
+            as u64,
         bin_bytes: (8.0 * n_bins * (1.0 + n_values) * 2.0) as u64,
         output_bytes: output_bytes(plan),
         particle_steps,
@@ -163,6 +164,16 @@ fn own_values(plan: &Plan, n_values: f64) -> f64 {
         Some(_) => of_exchange + d * (d + 1.0) + 2.0,
     };
     exchanged + f64::from(u8::from(plan.transport.is_some()))
+}
+
+/// Bytes of what is remembered of pairs: a number and a weight of each of them, which fill whole lanes, as long as there
+/// is room.
+fn pair_bytes(plan: &Plan) -> f64 {
+    let Some(exchange) = plan.exchange.as_ref().filter(|exchange| exchange.spreading.is_none()) else {
+        return 0.0;
+    };
+    let neighbours = exchange.sizes(plan, plan.time.step).neighbours;
+    (10.0 * plan.particles.count as f64 * (neighbours + 4.0)).min(MOST_PAIR_BYTES as f64)
 }
 
 /// Nanoseconds per particle and step of an exchange. Parcels at rest are sorted, and their weights made, once in a run.

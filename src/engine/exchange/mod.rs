@@ -3,6 +3,7 @@
 //! Owns one step of it. May use blocks, kernels and `parallel`. It deliberately moves nothing: places stay as they are.
 
 mod around;
+mod bands;
 mod crowd;
 mod ellipse;
 mod in_run;
@@ -10,6 +11,7 @@ mod integrate;
 mod local;
 mod matrix;
 mod near;
+mod notes;
 mod operator;
 mod own_kernels;
 mod space;
@@ -20,7 +22,7 @@ use super::error::RunError;
 use super::parallel::Pool;
 use super::program::{Program, Role, unsound};
 use crate::maths::wide::Width;
-use crate::plan::exchange::{Exchange as Planned, Sizes};
+use crate::plan::exchange::{Exchange as Planned, MOST_PAIR_BYTES, Sizes};
 use crate::plan::transport::{Patch, SideRule};
 use crate::plan::{Axis, Plan, Side};
 use crate::state::particles::Block;
@@ -28,6 +30,7 @@ use around::Around;
 use crowd::{MOST_BLOCKS, Sorted};
 use local::Local;
 use near::Near;
+use notes::{Notes, Sheets};
 use operator::{Operator, Profile};
 use space::Space;
 
@@ -42,6 +45,7 @@ pub struct Exchange<const D: usize> {
     sorted: Sorted,
     /// What the weights of the parcels as they are sorted are made of.
     factors: Vec<f64>,
+    notes: Notes,
     columns: Vec<Vec<f64>>,
     lists: Pool<Near<D>>,
     own_lists: Pool<Around>,
@@ -91,6 +95,7 @@ impl<const D: usize> Exchange<D> {
             profile,
             sorted: Sorted::default(),
             factors: Vec::new(),
+            notes: Notes::new(Sheets::new(settings.most_pair_bytes.unwrap_or(MOST_PAIR_BYTES))),
             columns: Vec::new(),
             lists: Pool::new(),
             own_lists: Pool::new(),
@@ -107,6 +112,8 @@ impl<const D: usize> Exchange<D> {
             profile: self.profile.clone(),
             sorted: Sorted::default(),
             factors: Vec::new(),
+            // Both together have no more room than one.
+            notes: Notes::new(self.notes.sheets.clone()),
             columns: Vec::new(),
             lists: Pool::new(),
             own_lists: Pool::new(),
@@ -156,13 +163,12 @@ impl<const D: usize> Exchange<D> {
             lists: &self.lists,
             own_lists: &self.own_lists,
             factors: std::mem::take(&mut self.factors),
+            notes: self.notes.take(),
             caps: Vec::new(),
         };
-        if !is_at_rest {
-            operator.weigh();
-        }
+        operator.prepare(self.planned.integration, is_at_rest);
         integrate::step(&mut operator, self.planned.integration, beta, &mut self.columns);
-        self.factors = operator.factors;
+        (self.factors, self.notes) = (operator.factors, operator.notes);
         let mut wrong = None;
         for (values, &column) in self.columns.iter().zip(&carried) {
             let found = self.sorted.give_back(blocks, column, values, limits[column / n_slots]);
