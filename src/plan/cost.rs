@@ -1,7 +1,7 @@
 //! What a run will cost: time from a table of measured stage costs, memory from the state.
 
 use super::chemistry::{Chemistry, Method};
-use super::exchange::{Exchange, MOST_PAIR_BYTES};
+use super::exchange::{Exchange, Integration, MOST_PAIR_BYTES};
 use super::integrator::Expected;
 use super::time_scales::TimeScales;
 use super::transport::{Flow, Transport};
@@ -23,9 +23,12 @@ mod table {
     pub(super) const STAND: f64 = 25.0;
     /// One parcel among its neighbours, and one of them weighed, with one, two and three axes: more dimensions have more
     /// that is sifted for each that is near. And one value of a neighbour.
-    pub(super) const PARCEL: [f64; 3] = [60.0, 110.0, 200.0];
-    pub(super) const PAIR: [f64; 3] = [3.5, 4.2, 7.4];
+    pub(super) const PARCEL: [f64; 3] = [60.0, 105.0, 200.0];
+    pub(super) const PAIR: [f64; 3] = [2.7, 3.3, 6.5];
     pub(super) const PAIR_VALUE: f64 = 0.6;
+    /// One parcel, and one neighbour weighed, of which another sum has noted what it found.
+    pub(super) const NOTED: f64 = 50.0;
+    pub(super) const NOTED_PAIR: f64 = 0.6;
     /// Neighbours where each parcel has a kernel of its own: more of them are looked at.
     pub(super) const OWN_KERNELS: f64 = 2.5;
     /// Relaxation of one stored value.
@@ -172,33 +175,47 @@ fn pair_bytes(plan: &Plan) -> f64 {
     let Some(exchange) = plan.exchange.as_ref().filter(|exchange| exchange.spreading.is_none()) else {
         return 0.0;
     };
+    all_pair_bytes(plan, exchange).min(MOST_PAIR_BYTES as f64)
+}
+
+fn all_pair_bytes(plan: &Plan, exchange: &Exchange) -> f64 {
     let neighbours = exchange.sizes(plan, plan.time.step).neighbours;
-    (10.0 * plan.particles.count as f64 * (neighbours + 4.0)).min(MOST_PAIR_BYTES as f64)
+    10.0 * plan.particles.count as f64 * (neighbours + 4.0)
 }
 
 /// Nanoseconds per particle and step of an exchange. Parcels at rest are sorted, and their weights made, once in a run.
 fn exchange_cost(plan: &Plan, n_values: f64) -> f64 {
     let Some(exchange) = &plan.exchange else { return 0.0 };
-    let [anew, applied] = exchange_parts(plan, exchange, n_values);
     let moves = plan.stages.iter().any(|stage| matches!(stage, Stage::Move | Stage::FusedStep));
     let walks = moves || exchange.spreading.is_some();
+    let [anew, applied] = exchange_parts(plan, exchange, n_values, walks);
     applied + if walks { anew } else { table::STAND + anew / plan.time.n_steps.max(1) as f64 }
 }
 
 /// The same of the first step, which is the dearest.
 pub(super) fn first_exchange(plan: &Plan, exchange: &Exchange) -> f64 {
     let n_values = (plan.components.len() * n_stored_values(plan)) as f64;
-    exchange_parts(plan, exchange, n_values).iter().sum()
+    exchange_parts(plan, exchange, n_values, true).iter().sum()
 }
 
-/// What it takes to sort parcels and to make their weights, and to apply these.
-fn exchange_parts(plan: &Plan, exchange: &Exchange, n_values: f64) -> [f64; 2] {
+/// What it takes to sort parcels and to make their weights, and to apply these; in steps in which all sums may be noted, or as
+/// far as there is room.
+fn exchange_parts(plan: &Plan, exchange: &Exchange, n_values: f64, are_noted: bool) -> [f64; 2] {
     let sizes = exchange.sizes(plan, plan.time.step);
     let (weights, applied) = exchange.sums(sizes.share);
     let axis = plan.axes.len().clamp(1, 3) - 1;
-    let looked_at = if exchange.spreading.is_some() { table::OWN_KERNELS } else { 1.0 } * sizes.neighbours;
+    let has_notes = exchange.spreading.is_none();
+    let looked_at = if has_notes { 1.0 } else { table::OWN_KERNELS } * sizes.neighbours;
     let sum = table::PARCEL[axis] + looked_at * (table::PAIR[axis] + table::PAIR_VALUE * n_values);
-    [table::SORT + weights * sum, applied * sum]
+    let noted = table::NOTED + looked_at * (table::NOTED_PAIR + table::PAIR_VALUE * n_values);
+    let all = all_pair_bytes(plan, exchange);
+    let share = match exchange.integration {
+        _ if !has_notes => 0.0,
+        Integration::Explicit if are_noted && weights <= 1.0 => 1.0,
+        _ => pair_bytes(plan) / all.max(1.0),
+    };
+    let again = share * noted + (1.0 - share) * sum;
+    [table::SORT + sum + (weights - 1.0) * again, applied * again]
 }
 
 /// Nanoseconds per particle and step of a walk along tracks.

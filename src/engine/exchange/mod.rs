@@ -14,6 +14,7 @@ mod near;
 mod notes;
 mod operator;
 mod own_kernels;
+mod picks;
 mod space;
 mod table;
 
