@@ -363,7 +363,7 @@ fn memory_counts_what_is_sorted_and_weighed() {
     let expected = 8.0 * 240.0 * (2.0 + 3.0 + 4.0) + of_pairs;
     assert_eq!(with.cost.state_bytes - without.state_bytes, expected as u64);
     // Of many parcels not all pairs are remembered.
-    let many = edited(LINE, "parcels 240", "parcels 1e6");
+    let many = edited(LINE, "fluid 240", "fluid 1000000");
     let (with, without) = (of(&many, "exchange kernel gaussian").cost, compile(&many).cost);
     assert_eq!(with.state_bytes - without.state_bytes, 8_000_000 * 9 + (12 << 20));
 }

@@ -6,6 +6,8 @@
 //! A step of parcels that walk has two sums: densities, and differences weighed with them. Portions are taken through both in
 //! the order of cells, the second as soon as all that is near has its density, so that few notes are needed at once.
 
+#![allow(clippy::needless_range_loop)] // Zipped iterators are not always inlined; these loops are hot.
+
 use super::super::parallel;
 use super::near::{LANES, MOST_TARGETS, Near, PADDING, folded};
 use super::notes::{Note, Noted, Notes, Reader, Sheets};

@@ -364,6 +364,7 @@ impl<const D: usize> Near<D> {
         }
         self.weigh(kernel, square);
         let (weights, noted) = (&self.weights[..n], &mut noted[..n]);
+        #[allow(clippy::manual_memcpy)]
         for at in 0..n {
             noted[at] = weights[at];
         }
