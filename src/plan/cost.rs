@@ -24,11 +24,11 @@ mod table {
     /// One parcel among its neighbours, and one of them weighed, with one, two and three axes: more dimensions have more
     /// that is sifted for each that is near. And one value of a neighbour.
     pub(super) const PARCEL: [f64; 3] = [60.0, 105.0, 200.0];
-    pub(super) const PAIR: [f64; 3] = [2.7, 3.3, 6.5];
+    pub(super) const PAIR: [f64; 3] = [3.5, 3.3, 7.4];
     pub(super) const PAIR_VALUE: f64 = 0.6;
-    /// One parcel, and one neighbour weighed, of which another sum has noted what it found.
-    pub(super) const NOTED: f64 = 50.0;
-    pub(super) const NOTED_PAIR: f64 = 0.6;
+    /// One parcel, and one neighbour weighed, of which another sum has noted what it found. In space not all notes have room.
+    pub(super) const NOTED: [f64; 3] = [50.0, 50.0, 200.0];
+    pub(super) const NOTED_PAIR: [f64; 3] = [0.6, 0.6, 3.0];
     /// Neighbours where each parcel has a kernel of its own: more of them are looked at.
     pub(super) const OWN_KERNELS: f64 = 2.5;
     /// Relaxation of one stored value.
@@ -207,7 +207,7 @@ fn exchange_parts(plan: &Plan, exchange: &Exchange, n_values: f64, are_noted: bo
     let has_notes = exchange.spreading.is_none();
     let looked_at = if has_notes { 1.0 } else { table::OWN_KERNELS } * sizes.neighbours;
     let sum = table::PARCEL[axis] + looked_at * (table::PAIR[axis] + table::PAIR_VALUE * n_values);
-    let noted = table::NOTED + looked_at * (table::NOTED_PAIR + table::PAIR_VALUE * n_values);
+    let noted = table::NOTED[axis] + looked_at * (table::NOTED_PAIR[axis] + table::PAIR_VALUE * n_values);
     let all = all_pair_bytes(plan, exchange);
     let share = match exchange.integration {
         _ if !has_notes => 0.0,
