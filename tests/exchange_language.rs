@@ -355,11 +355,17 @@ fn steps_and_bins_are_judged_by_all_dispersion() {
     assert_near(ratio("exchange bandwidth 1 m, mixing_fraction 0.3"), walking, 1e-12);
 }
 
-/// Coordinates and values of the order of cells, and what a step works with.
+/// Coordinates and values of the order of cells, what a step works with, and ten bytes of each pair, in lanes of eight.
 #[test]
 fn memory_counts_what_is_sorted_and_weighed() {
-    let (with, without) = (of(LINE, "exchange kernel gaussian").cost, compile(LINE).cost);
-    assert_eq!(with.state_bytes - without.state_bytes, 8 * 240 * (2 + 3 + 4));
+    let (with, without) = (of(LINE, "exchange kernel gaussian"), compile(LINE).cost);
+    let of_pairs = 240.0 * 10.0 * (sizes(&with).neighbours + 4.0);
+    let expected = 8.0 * 240.0 * (2.0 + 3.0 + 4.0) + of_pairs;
+    assert_eq!(with.cost.state_bytes - without.state_bytes, expected as u64);
+    // Of many parcels not all pairs are remembered.
+    let many = edited(LINE, "fluid 240", "fluid 1000000");
+    let (with, without) = (of(&many, "exchange kernel gaussian").cost, compile(&many).cost);
+    assert_eq!(with.state_bytes - without.state_bytes, 8_000_000 * 9 + (12 << 20));
 }
 
 /// 0.6404 D t |h² − ℓ²|/σ⁴ for D t = 10 m², h = 0.75 m, ℓ = 0.5 m, σ² = 21 m².

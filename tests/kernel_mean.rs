@@ -187,3 +187,42 @@ fn the_front_goes_to_its_limit() {
     assert!(err < 0.12 && blur < 0.15, "{err} {blur}");
     assert!(of_bins.measure("err") < 0.12);
 }
+
+/// What a run tells of its noise is the scatter over seeds; on bins narrower than the kernel, whose parcels all see the same mean,
+/// it is on the safe side.
+#[test]
+fn standard_errors_are_no_smaller_than_the_scatter() {
+    const SCENE: &str = "lamella 1
+species A
+domain line x = 0 m .. 2 m
+boundary left, right reflect
+dispersion 1e-4 m^2/s
+mixing zones { a: fraction 1, rate instant }
+average kernel gaussian, bandwidth 0.1 m
+initial A = if x < 1 m then 1 mol/m^3 else 0
+particles fluid 1000 random
+run to 200 s, step 20 s
+output profile A at t = 200 s on BINS
+";
+    for (bins, middle, range) in [("40", 15..25, 1.0..4.0), ("10", 4..6, 0.7..1.6)] {
+        let (mut all, mut told) = (Vec::new(), 0.0);
+        const N: u64 = 24;
+        for seed in 1..=N {
+            let settings = Settings { seed: Some(seed), ..Settings::default() };
+            let finished = run_with(&edited(SCENE, "BINS", bins), &settings);
+            let Values::Binned { mean, standard_error, .. } = &finished.snapshots[0].values else {
+                panic!("no profile")
+            };
+            all.push(mean[0][middle.clone()].to_vec());
+            told += standard_error[0][middle.clone()].iter().map(|own| own * own).sum::<f64>() / N as f64;
+        }
+        let mut found = 0.0;
+        for bin in 0..middle.len() {
+            let mean = all.iter().map(|own| own[bin]).sum::<f64>() / N as f64;
+            found += all.iter().map(|own| (own[bin] - mean).powi(2)).sum::<f64>() / (N - 1) as f64;
+        }
+        let ratio = (told / found).sqrt();
+        tell(&format!("{bins} bins: told over found {ratio}"));
+        assert!(range.contains(&ratio), "{bins}: {ratio}");
+    }
+}

@@ -16,6 +16,9 @@ pub struct Settings {
     /// plan with half the step and without this: both runs then follow the same paths, and differ by
     /// what the step does to them alone.
     pub takes_half_draws: bool,
+    /// Bytes of what is remembered of pairs of parcels, at most; `None` takes what is good. Without any, neighbours are
+    /// looked for anew in every sum, to compare.
+    pub most_pair_bytes: Option<usize>,
     /// The flows of the plan, one after another, where they have to be solved or read.
     pub flow: Option<FlowSeries>,
 }

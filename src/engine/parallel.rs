@@ -24,6 +24,11 @@ pub fn for_each<T: Send>(items: &mut [T], work: &(dyn Fn(usize, &mut T) + Sync))
     });
 }
 
+/// How many threads the current pool has.
+pub fn n_threads() -> usize {
+    rayon::current_num_threads()
+}
+
 /// Results for `0..n`, in order.
 pub fn map<R: Send>(n: usize, work: &(dyn Fn(usize) -> R + Sync)) -> Vec<R> {
     let mut results: Vec<Option<R>> = (0..n).map(|_| None).collect();

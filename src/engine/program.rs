@@ -180,6 +180,12 @@ impl<'a, const D: usize> Program<'a, D> {
         self.plan.hangs_on_bins()
     }
 
+    /// Which of a component's columns is a mean over the parcels around.
+    pub fn mean_slot(&self) -> Option<usize> {
+        let slot = self.roles.iter().position(|role| *role == Role::Mean);
+        slot.filter(|_| self.plan.has_kernel_mean())
+    }
+
     /// Whether any zone approaches the mean of its bin.
     pub fn relaxes(&self) -> bool {
         self.has_mixing() && self.roles.iter().any(|role| !matches!(role, Role::Fixed))

@@ -2,6 +2,8 @@
 //!
 //! Owns their plans and seeds. May use the plan. It deliberately runs nothing.
 
+use crate::plan::averaging::Averaging;
+use crate::plan::tape::{Operation, Tape};
 use crate::plan::{OutputKind, Plan, Side, ZoneRate};
 use crate::scenario::MAX_BINS;
 
@@ -97,7 +99,8 @@ fn has_step_error(plan: &Plan) -> bool {
         let side = if drift < 0.0 { axis.low_side } else { axis.high_side };
         drift != 0.0 && side == Side::Reflect
     });
-    exchanges || plan.exchange.is_some() || leans
+    let reacts_to_means = plan.has_kernel_mean() && plan.reacts_in_steps();
+    exchanges || plan.exchange.is_some() || reacts_to_means || leans
 }
 
 /// The seed of a group: the first eight bytes of a BLAKE3 of the root seed and the number.
@@ -115,8 +118,18 @@ fn seed(root: u64, group: usize) -> u64 {
 fn fewer(plan: &Plan) -> Plan {
     let mut plan = watched(plan);
     let count = plan.particles.count.div_ceil(FEWER);
+    let averaging = plan.mixing.as_ref().and_then(|mixing| mixing.averaging.as_ref());
+    let bandwidth = averaging.map(|averaging| averaging.extents(&plan).bandwidth);
     plan.set_count(count);
+    if let (Some(bandwidth), Some(averaging)) = (bandwidth, averaging_of(&mut plan)) {
+        // Fewer parcels are one thing, wider means another.
+        averaging.bandwidth = Tape { operations: vec![Operation::Constant(bandwidth)] };
+    }
     plan
+}
+
+fn averaging_of(plan: &mut Plan) -> Option<&mut Averaging> {
+    plan.mixing.as_mut().and_then(|mixing| mixing.averaging.as_mut())
 }
 
 /// The plan without times for outputs that have no error bar: single particles, budgets.
@@ -143,6 +156,9 @@ fn half_step(plan: &Plan) -> Plan {
 fn half_bins(plan: &Plan) -> Option<Plan> {
     let mut plan = watched(plan);
     plan.axes.iter_mut().for_each(|axis| axis.bins *= 2);
+    if let Some(averaging) = averaging_of(&mut plan) {
+        averaging.bandwidth.scale(0.5);
+    }
     let within_bins = plan.outputs.iter_mut().filter(|output| output.kind.is_of_pairs());
     within_bins.for_each(|output| output.bins.iter_mut().for_each(|bins| *bins *= 2));
     let n_bins = |bins: &mut dyn Iterator<Item = usize>| bins.map(|n| n as f64).product::<f64>();

@@ -48,12 +48,25 @@ pub fn exp_and_less_one(x: f64) -> (f64, f64) {
 /// Shape: rises from nearly 0 to 1.
 #[inline(always)]
 pub fn exp_of_negative(x: f64) -> f64 {
+    let (power, r) = reduced_negative(x);
+    exp_near(r) * power
+}
+
+/// The two parts of [`exp_of_negative`]: a power of two, and the rest of the exponent.
+#[inline(always)]
+pub fn reduced_negative(x: f64) -> (f64, f64) {
     let x = if x < -708.0 { -708.0 } else { x };
     let n = x * std::f64::consts::LOG2_E + ROUND;
     let whole = n - ROUND;
     let r = (x - whole * LN_2_HIGH) - whole * LN_2_LOW;
     let power = f64::from_bits((n.to_bits() << 52).wrapping_add(1.0_f64.to_bits()));
-    (1.0 + exp_less_one_near(r)) * power
+    (power, r)
+}
+
+/// `e^r` of a rest.
+#[inline(always)]
+pub fn exp_near(r: f64) -> f64 {
+    1.0 + exp_less_one_near(r)
 }
 
 /// `e^r − 1` and two powers of two: together `e^x`. Two, as one could not reach the smallest numbers.

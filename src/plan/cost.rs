@@ -1,7 +1,7 @@
 //! What a run will cost: time from a table of measured stage costs, memory from the state.
 
 use super::chemistry::{Chemistry, Method};
-use super::exchange::Exchange;
+use super::exchange::{Exchange, Integration, MOST_PAIR_BYTES};
 use super::integrator::Expected;
 use super::time_scales::TimeScales;
 use super::transport::{Flow, Transport};
@@ -23,9 +23,12 @@ mod table {
     pub(super) const STAND: f64 = 25.0;
     /// One parcel among its neighbours, and one of them weighed, with one, two and three axes: more dimensions have more
     /// that is sifted for each that is near. And one value of a neighbour.
-    pub(super) const PARCEL: [f64; 3] = [60.0, 110.0, 200.0];
-    pub(super) const PAIR: [f64; 3] = [3.5, 4.2, 7.4];
+    pub(super) const PARCEL: [f64; 3] = [60.0, 105.0, 200.0];
+    pub(super) const PAIR: [f64; 3] = [3.5, 3.3, 7.4];
     pub(super) const PAIR_VALUE: f64 = 0.6;
+    /// One parcel, and one neighbour weighed, of which another sum has noted what it found. In space not all notes have room.
+    pub(super) const NOTED: [f64; 3] = [50.0, 50.0, 200.0];
+    pub(super) const NOTED_PAIR: [f64; 3] = [0.6, 0.6, 3.0];
     /// Neighbours where each parcel has a kernel of its own: more of them are looked at.
     pub(super) const OWN_KERNELS: f64 = 2.5;
     /// Relaxation of one stored value.
@@ -145,7 +148,8 @@ pub fn estimate(plan: &Plan, scales: Option<&TimeScales>) -> Cost {
         + (table::OBSERVE_BIN + table::WRITE_ROW) * n_binned;
     let n_bins: f64 = plan.axes.iter().map(|axis| axis.bins as f64).product();
     Cost {
-        state_bytes: (8.0 * n_particles * (n_axes + n_values + own_values(plan, n_values))) as u64,
+        state_bytes: (8.0 * n_particles * (n_axes + n_values + own_values(plan, n_values)) + pair_bytes(plan))
+            as u64,
         bin_bytes: (8.0 * n_bins * (1.0 + n_values) * 2.0) as u64,
         output_bytes: output_bytes(plan),
         particle_steps,
@@ -166,36 +170,66 @@ fn own_values(plan: &Plan, n_values: f64) -> f64 {
         // Half a metric and a share, as parcels lie and in the order of cells.
         Some(_) => of_exchange + d * (d + 1.0) + 2.0,
     };
-    exchanged + f64::from(u8::from(plan.transport.is_some()))
+    // The sums of an exponential step have room of their own.
+    let averaged = if plan.has_kernel_mean() { 2.0 * d + 6.0 * n_values + 4.0 } else { 0.0 };
+    exchanged + averaged + f64::from(u8::from(plan.transport.is_some()))
+}
+
+/// Bytes of what is remembered of pairs, by an exchange and by means over the parcels around, as long as there is room.
+fn pair_bytes(plan: &Plan) -> f64 {
+    let exchange = plan.exchange.as_ref().filter(|exchange| exchange.spreading.is_none());
+    let exchanged = exchange.map_or(0.0, |exchange| all_pair_bytes(plan, exchange));
+    let averaging = plan.mixing.as_ref().and_then(|mixing| mixing.averaging.as_ref());
+    let averaged = averaging.map_or(0.0, |it| bytes_of_pairs(plan, it.extents(plan).neighbours));
+    exchanged.min(MOST_PAIR_BYTES as f64) + averaged.min(MOST_PAIR_BYTES as f64)
+}
+
+fn all_pair_bytes(plan: &Plan, exchange: &Exchange) -> f64 {
+    bytes_of_pairs(plan, exchange.sizes(plan, plan.time.step).neighbours)
+}
+
+/// A number and a weight of each of them, which fill whole lanes.
+fn bytes_of_pairs(plan: &Plan, neighbours: f64) -> f64 {
+    10.0 * plan.particles.count as f64 * (neighbours + 4.0)
 }
 
 /// Nanoseconds per particle and step of an exchange. Parcels at rest are sorted, and their weights made, once in a run.
 fn exchange_cost(plan: &Plan, n_values: f64) -> f64 {
     let Some(exchange) = &plan.exchange else { return 0.0 };
-    let [anew, applied] = exchange_parts(plan, exchange, n_values);
     let moves = plan.stages.iter().any(|stage| matches!(stage, Stage::Move | Stage::FusedStep));
     let walks = moves || exchange.spreading.is_some();
+    let [anew, applied] = exchange_parts(plan, exchange, n_values, walks);
     applied + if walks { anew } else { table::STAND + anew / plan.time.n_steps.max(1) as f64 }
 }
 
-/// Means over the parcels around: weights, the sums of each rate, and the mean that is stored.
+/// Means over the parcels around: weights, the sums of each rate, and the mean that is stored. All sums but the first are of
+/// notes, as far as there is room.
 fn means_cost(plan: &Plan) -> f64 {
     let Some(mixing) = &plan.mixing else { return 0.0 };
     let Some(averaging) = &mixing.averaging else { return 0.0 };
     let d = plan.axes.len();
     let axis = d.clamp(1, 3) - 1;
-    let extents = averaging.extents(plan);
+    let n = averaging.extents(plan).neighbours;
+    let all = bytes_of_pairs(plan, n);
+    let share = all.min(MOST_PAIR_BYTES as f64) / all.max(1.0);
     let sum = |n_values: f64| {
-        table::PARCEL[axis] + extents.neighbours * (table::PAIR[axis] + table::PAIR_VALUE * n_values)
+        let anew = table::PARCEL[axis] + n * (table::PAIR[axis] + table::PAIR_VALUE * n_values);
+        let noted = table::NOTED[axis] + n * (table::NOTED_PAIR[axis] + table::PAIR_VALUE * n_values);
+        (anew, share * noted + (1.0 - share) * anew)
     };
-    let (n_components, exchange) = (plan.n_mobile() as f64, averaging.as_exchange(d));
+    let n_components = plan.n_mobile() as f64;
     let of_zone = |zone: &Zone| match zone.rate {
-        ZoneRate::Finite(rate) if rate > 0.0 => jumps(0.5 * rate * plan.time.step) * sum(n_components),
+        ZoneRate::Finite(rate) if rate > 0.0 => jumps(0.5 * rate * plan.time.step) * sum(n_components).1,
         ZoneRate::Finite(_) | ZoneRate::Instant => 0.0,
     };
     let zones: f64 = mixing.zones.iter().map(of_zone).sum();
-    let stored = if mixing.stores_mean() { sum(n_components) } else { 0.0 };
-    table::SORT + exchange.sums(1.0).0 * sum(0.0) + zones + stored
+    // Weights that add up to more than one are cut down in a sum of their own: those of parcels that lie at random do.
+    let stored = if mixing.stores_mean() { 2.0 * sum(n_components).1 } else { 0.0 };
+    let (weights, _) = averaging.as_exchange(d).sums(1.0);
+    let anew = table::SORT + sum(0.0).0 + (weights - 1.0) * sum(1.0).1;
+    let moves = plan.stages.iter().any(|stage| matches!(stage, Stage::Move | Stage::FusedStep));
+    let anew = if moves { anew } else { table::STAND + anew / plan.time.n_steps.max(1) as f64 };
+    anew + zones + stored
 }
 
 /// Sums of an exponential step up to a rest of 1e-12, about: terms of a Poisson distribution.
@@ -213,17 +247,27 @@ fn jumps(share: f64) -> f64 {
 /// The same of the first step, which is the dearest.
 pub(super) fn first_exchange(plan: &Plan, exchange: &Exchange) -> f64 {
     let n_values = (plan.components.len() * n_stored_values(plan)) as f64;
-    exchange_parts(plan, exchange, n_values).iter().sum()
+    exchange_parts(plan, exchange, n_values, true).iter().sum()
 }
 
-/// What it takes to sort parcels and to make their weights, and to apply these.
-fn exchange_parts(plan: &Plan, exchange: &Exchange, n_values: f64) -> [f64; 2] {
+/// What it takes to sort parcels and to make their weights, and to apply these; in steps in which all sums may be noted, or as
+/// far as there is room.
+fn exchange_parts(plan: &Plan, exchange: &Exchange, n_values: f64, are_noted: bool) -> [f64; 2] {
     let sizes = exchange.sizes(plan, plan.time.step);
     let (weights, applied) = exchange.sums(sizes.share);
     let axis = plan.axes.len().clamp(1, 3) - 1;
-    let looked_at = if exchange.spreading.is_some() { table::OWN_KERNELS } else { 1.0 } * sizes.neighbours;
+    let has_notes = exchange.spreading.is_none();
+    let looked_at = if has_notes { 1.0 } else { table::OWN_KERNELS } * sizes.neighbours;
     let sum = table::PARCEL[axis] + looked_at * (table::PAIR[axis] + table::PAIR_VALUE * n_values);
-    [table::SORT + weights * sum, applied * sum]
+    let noted = table::NOTED[axis] + looked_at * (table::NOTED_PAIR[axis] + table::PAIR_VALUE * n_values);
+    let all = all_pair_bytes(plan, exchange);
+    let share = match exchange.integration {
+        _ if !has_notes => 0.0,
+        Integration::Explicit if are_noted && weights <= 1.0 => 1.0,
+        _ => all.min(MOST_PAIR_BYTES as f64) / all.max(1.0),
+    };
+    let again = share * noted + (1.0 - share) * sum;
+    [table::SORT + sum + (weights - 1.0) * again, applied * again]
 }
 
 /// Nanoseconds per particle and step of a walk along tracks.

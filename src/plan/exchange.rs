@@ -48,6 +48,9 @@ pub enum Kernel {
 /// `W` and `−W′/q` over q.
 pub type Profile<'e> = Box<dyn Fn(f64) -> (f64, f64) + 'e>;
 
+/// Bytes of what a run remembers of pairs of parcels, at most.
+pub const MOST_PAIR_BYTES: usize = 12 << 20;
+
 /// What follows from a plan for its exchange.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sizes {

@@ -140,19 +140,21 @@ fn splitting(
     limits: &mut Vec<Limit>,
     diagnostics: &mut Vec<Diagnostic>,
 ) {
+    let (step, rate) = (plan.time.step, scales.fastest_rate());
+    // What an instant zone has reacted is seen by others when the next mean over the parcels around is taken.
+    let of_instant = if plan.has_kernel_mean() { 1.0 / step } else { 0.0 };
     let zones = plan.mixing.iter().flat_map(|mixing| &mixing.zones);
     let exchange = zones.map(|zone| match zone.rate {
         ZoneRate::Finite(rate) => 0.5 * zone.fraction * rate,
-        ZoneRate::Instant => 0.0,
+        ZoneRate::Instant => zone.fraction * of_instant,
     });
     let exchange = exchange.fold(0.0, f64::max);
     if exchange == 0.0 {
         return;
     }
-    let (step, rate) = (plan.time.step, scales.fastest_rate());
     let first_order = 0.5 * exchange * step * (rate * step).min(1.0);
-    let is_symmetric =
-        plan.chemistry.as_ref().is_some_and(|chemistry| chemistry.splitting == Splitting::Strang);
+    let is_strang = plan.chemistry.as_ref().is_some_and(|chemistry| chemistry.splitting == Splitting::Strang);
+    let is_symmetric = is_strang && of_instant == 0.0;
     let value = if is_symmetric { first_order * first_order } else { first_order };
     limits.push(Limit {
         name: "splitting of exchange and reaction".into(),

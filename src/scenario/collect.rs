@@ -48,6 +48,14 @@ impl Statements<'_> {
     pub fn has_bins(&self) -> bool {
         self.average.is_some_and(|(_, average)| average.bins.is_some())
     }
+
+    /// How to come by bins.
+    pub fn bins_help(&self, n: usize) -> String {
+        match self.average {
+            Some(_) => format!("add `, bins {n}` to the `average` of the scene"),
+            None => format!("add for example `average bins {n}`"),
+        }
+    }
 }
 
 /// Resolves a scene: everything that can be wrong is reported together.

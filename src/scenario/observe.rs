@@ -248,13 +248,18 @@ fn output_bins<'a>(
             checker.report(if kind == OutputKind::Mixing {
                 message
                     .at(written.kind.span, "no `average bins` in the scene")
-                    .expected("one `average` statement")
-                    .help("add for example `average bins 100`")
+                    .expected("bins of an `average`")
+                    .help(statements.bins_help(100))
             } else {
                 message
                     .at(written.kind.span, "neither `on` here nor `average bins` in the scene")
                     .expected("`on` and a number of bins")
-                    .help("add `on 100` to the output, or `average bins 100` to the scene")
+                    .help(match statements.average {
+                        Some(_) => {
+                            "add `on 100` to the output, or `, bins 100` to the `average` of the scene"
+                        }
+                        None => "add `on 100` to the output, or `average bins 100` to the scene",
+                    })
             });
         }
         return None;

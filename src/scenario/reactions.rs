@@ -206,10 +206,13 @@ pub(super) fn check_places(checker: &mut Checker<'_>, scenario: &Scenario) {
     } else if scenario.bins.is_none() {
         checker.report(
             Diagnostic::error(M001, format!("`{}` needs bins to live in", species.name))
-                .at(species.span, format!("{} species without an `average` statement", word(species)))
-                .found("no `average`")
-                .expected("one `average` statement")
-                .help("add for example `average bins 300`"),
+                .at(species.span, format!("{} species without bins", word(species)))
+                .found("no bins")
+                .expected("`bins` of an `average` statement")
+                .help(match &scenario.averaging {
+                    Some(_) => "add `, bins 300` to the `average` of the scene",
+                    None => "add for example `average bins 300`",
+                }),
         );
     }
 }

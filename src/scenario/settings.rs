@@ -79,10 +79,10 @@ pub(super) fn read_settings(
 
 /// The sizes that the scene has a statement for.
 fn sizes(file: &tree::File) -> Vec<Target> {
-    let of = |statement: &tree::Statement| match statement.kind {
+    let of = |statement: &tree::Statement| match &statement.kind {
         StatementKind::Particles(_) => Some(Target::Particles),
         StatementKind::Run(_) => Some(Target::Step),
-        StatementKind::Average(_) => Some(Target::Bins),
+        StatementKind::Average(average) => average.bins.as_ref().map(|_| Target::Bins),
         _ => None,
     };
     let mut sizes: Vec<Target> = file.statements.iter().filter_map(of).collect();

@@ -33,10 +33,23 @@ pub fn find(name: &str) -> Option<&'static Item> {
 
 /// A profile as inner loops take it. `q` is a distance over the bandwidth, within the support.
 pub trait Radial: Copy {
+    /// Whether `−W′/q` is `W`, to the last bit.
+    const IS_ITS_OWN_FORCE: bool = false;
+    /// Whether it is worked out faster in two parts.
+    const HAS_PARTS: bool = false;
     /// `W(q)`.
     fn value(self, q2: f64) -> f64;
     /// `−W′(q)/q`: what two particles exchange by.
     fn force(self, q2: f64) -> f64;
+    /// Two numbers: the first, times [`Self::of_rest`] of the second, is `W(q)` to the last bit.
+    #[inline(always)]
+    fn parts(self, q2: f64) -> (f64, f64) {
+        (1.0, q2)
+    }
+    #[inline(always)]
+    fn of_rest(self, rest: f64) -> f64 {
+        self.value(rest)
+    }
 }
 
 /// One kernel of the catalogue.

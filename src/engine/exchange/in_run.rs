@@ -16,7 +16,10 @@ pub struct Exchanges<const D: usize> {
 
 impl<const D: usize> Exchanges<D> {
     pub fn new(program: &Program<D>, settings: &Settings) -> Result<Self, RunError> {
-        Ok(Self { dispersion: Exchange::new(program, settings)?, means: Exchange::of_means(program)? })
+        Ok(Self {
+            dispersion: Exchange::new(program, settings)?,
+            means: Exchange::of_means(program, settings)?,
+        })
     }
 
     /// The same, to go another way from here.

@@ -14,7 +14,7 @@ const WHOLE: f64 = 1.0 + 1e-12;
 const RESIDUAL: f64 = 1e-14;
 const MOST_ITERATIONS: usize = 10_000;
 
-/// Rest of the exponential series, of all that a step does.
+/// Rest of the exponential series, relative to the values.
 const REST: f64 = 1e-16;
 
 /// Takes columns through a step that exchanges the share `beta`.
@@ -50,7 +50,7 @@ fn largest(sums: &[f64]) -> f64 {
 fn explicit<const D: usize>(operator: &mut Operator<D>, beta: f64, columns: &mut [Vec<f64>]) {
     let n = columns.first().map_or(0, Vec::len);
     let mut found = zeros(columns.len() + 1, n);
-    operator.differences(columns, &mut found);
+    operator.first_differences(columns, &mut found);
     let sums = &found[columns.len()];
     if beta * largest(sums) > WHOLE {
         let cap = |&sum: &f64| if beta * sum > 1.0 { 1.0 / (beta * sum) } else { 1.0 };

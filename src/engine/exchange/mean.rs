@@ -2,6 +2,7 @@
 //!
 //! Owns this use of the sums of an exchange. May use the operator. It deliberately knows no bin.
 
+use super::super::control::Settings;
 use super::super::error::RunError;
 use super::super::program::{Program, Role, unsound};
 use super::integrate;
@@ -11,18 +12,18 @@ use crate::maths::wide::Width;
 use crate::plan::exchange::Integration;
 use crate::state::particles::Block;
 
-/// Rest of the series of a step, of all that it exchanges: noise of means is far above it.
+/// Rest of the series of a step, relative to the values: noise of means is far above it.
 const REST: f64 = 1e-12;
 
 impl<const D: usize> Exchange<D> {
     /// The sums of a kernel mean; nothing where zones exchange with the means of bins.
-    pub fn of_means(program: &Program<D>) -> Result<Option<Self>, RunError> {
+    pub fn of_means(program: &Program<D>, settings: &Settings) -> Result<Option<Self>, RunError> {
         let plan = program.plan;
         let averaging = plan.mixing.as_ref().and_then(|mixing| mixing.averaging.as_ref());
         let Some(averaging) = averaging else { return Ok(None) };
         let planned = averaging.as_exchange(D);
         planned.check(D).map_err(|reason| unsound(&reason))?;
-        Self::of(plan, planned, None).map(Some)
+        Self::of(plan, planned, None, settings).map(Some)
     }
 
     /// Zones exchange over `dt`, and the mean is taken of what they then are.
@@ -44,13 +45,15 @@ impl<const D: usize> Exchange<D> {
         if all.is_empty() {
             return Ok(None);
         }
-        self.on_columns(blocks, (&all, Weights::Values, width), &mut |operator, columns| {
+        let relaxes = program.roles.iter().any(|role| matches!(role, Role::Relaxing(_)));
+        let integration = if relaxes { Integration::Exponential } else { Integration::Explicit };
+        self.on_columns(blocks, (&all, Weights::Values, width), integration, &mut |operator, columns| {
             for (slot, role) in program.roles.iter().enumerate() {
                 if let Role::Relaxing(rate) = role {
                     approach(operator, columns, (slot, n_slots), 0.5 * rate * dt);
                 }
             }
-            if let Some(slot) = program.roles.iter().position(|role| *role == Role::Mean) {
+            if let Some(slot) = program.mean_slot() {
                 take_means(operator, columns, (slot, n_slots), &program.mean_weights);
             }
         })?;
@@ -65,6 +68,9 @@ fn approach<const D: usize>(
     (slot, n_slots): (usize, usize),
     share: f64,
 ) {
+    if share <= 0.0 {
+        return;
+    }
     let mut own: Vec<Vec<f64>> = columns.iter_mut().skip(slot).step_by(n_slots).map(std::mem::take).collect();
     integrate::exponential(operator, (share, REST), &mut own);
     columns.iter_mut().skip(slot).step_by(n_slots).zip(own).for_each(|(column, own)| *column = own);

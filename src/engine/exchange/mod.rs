@@ -3,6 +3,7 @@
 //! Owns one step of it. May use blocks, kernels and `parallel`. It deliberately moves nothing: places stay as they are.
 
 mod around;
+mod bands;
 mod crowd;
 mod ellipse;
 mod in_run;
@@ -11,8 +12,10 @@ mod local;
 mod matrix;
 mod mean;
 mod near;
+mod notes;
 mod operator;
 mod own_kernels;
+mod picks;
 mod space;
 mod table;
 
@@ -21,7 +24,7 @@ use super::error::RunError;
 use super::parallel::Pool;
 use super::program::{Program, Role, unsound};
 use crate::maths::wide::Width;
-use crate::plan::exchange::{Exchange as Planned, Sizes};
+use crate::plan::exchange::{Exchange as Planned, Integration, MOST_PAIR_BYTES, Sizes};
 use crate::plan::transport::{Patch, SideRule};
 use crate::plan::{Axis, Plan, Side};
 use crate::state::particles::Block;
@@ -29,6 +32,7 @@ use around::Around;
 use crowd::{MOST_BLOCKS, Sorted};
 use local::Local;
 use near::Near;
+use notes::{Notes, Sheets};
 use operator::{Operator, Profile, Weights};
 use space::Space;
 
@@ -45,6 +49,7 @@ pub struct Exchange<const D: usize> {
     sorted: Sorted,
     /// What the weights of the parcels as they are sorted are made of.
     factors: Vec<f64>,
+    notes: Notes,
     columns: Vec<Vec<f64>>,
     lists: Pool<Near<D>>,
     own_lists: Pool<Around>,
@@ -78,10 +83,15 @@ impl<const D: usize> Exchange<D> {
         let Some(planned) = &plan.exchange else { return Ok(None) };
         planned.check(D).map_err(|reason| unsound(&reason))?;
         let local = Local::new(plan, planned, settings)?;
-        Self::of(plan, planned.clone(), local).map(Some)
+        Self::of(plan, planned.clone(), local, settings).map(Some)
     }
 
-    fn of(plan: &Plan, planned: Planned, local: Option<Local<D>>) -> Result<Self, RunError> {
+    fn of(
+        plan: &Plan,
+        planned: Planned,
+        local: Option<Local<D>>,
+        settings: &Settings,
+    ) -> Result<Self, RunError> {
         let sizes = planned.sizes(plan, plan.time.step.min(plan.time.duration));
         let size = (sizes.bandwidth, sizes.radius);
         let space = Space::new(&closed(plan), &planned.diffusion, size, plan.particles.count)
@@ -97,6 +107,7 @@ impl<const D: usize> Exchange<D> {
             profile,
             sorted: Sorted::default(),
             factors: Vec::new(),
+            notes: Notes::new(Sheets::new(settings.most_pair_bytes.unwrap_or(MOST_PAIR_BYTES))),
             columns: Vec::new(),
             lists: Pool::new(),
             own_lists: Pool::new(),
@@ -113,6 +124,8 @@ impl<const D: usize> Exchange<D> {
             profile: self.profile.clone(),
             sorted: Sorted::default(),
             factors: Vec::new(),
+            // Both together have no more room than one.
+            notes: Notes::new(self.notes.sheets.clone()),
             columns: Vec::new(),
             lists: Pool::new(),
             own_lists: Pool::new(),
@@ -137,9 +150,14 @@ impl<const D: usize> Exchange<D> {
         }
         self.look(program, blocks, (dt, width))?;
         let (beta, integration) = (self.beta(dt), self.planned.integration);
-        self.on_columns(blocks, (&carried, Weights::Forces, width), &mut |operator, columns| {
-            integrate::step(operator, integration, beta, columns);
-        })?;
+        self.on_columns(
+            blocks,
+            (&carried, Weights::Forces, width),
+            integration,
+            &mut |operator, columns| {
+                integrate::step(operator, integration, beta, columns);
+            },
+        )?;
         Ok(self.give_back(blocks, &carried, (limits, n_slots)))
     }
 
@@ -148,6 +166,7 @@ impl<const D: usize> Exchange<D> {
         &mut self,
         blocks: &[Block<D>],
         (carried, weights, width): (&[usize], Weights, Width),
+        integration: Integration,
         work: &mut dyn FnMut(&mut Operator<D>, &mut [Vec<f64>]),
     ) -> Result<(), RunError> {
         if blocks.len() >= MOST_BLOCKS {
@@ -175,13 +194,12 @@ impl<const D: usize> Exchange<D> {
             lists: &self.lists,
             own_lists: &self.own_lists,
             factors: std::mem::take(&mut self.factors),
+            notes: self.notes.take(),
             caps: Vec::new(),
         };
-        if !is_at_rest {
-            operator.weigh();
-        }
+        operator.prepare(integration, is_at_rest);
         work(&mut operator, &mut self.columns);
-        self.factors = operator.factors;
+        (self.factors, self.notes) = (operator.factors, operator.notes);
         Ok(())
     }
 

@@ -8,6 +8,7 @@
 
 #![allow(clippy::needless_range_loop)] // Zipped iterators are not always inlined; these loops are hot.
 
+use super::picks::{ONES, ROOM, SETS, pick, pick_two};
 use super::space::{Image, Space};
 use crate::catalog::kernel::Radial;
 
@@ -22,9 +23,6 @@ pub const PADDING: usize = PIECE;
 
 /// Parcels of a group, at most.
 pub const MOST_TARGETS: usize = 16;
-
-/// Candidates copied together at once: what fits beside each other in the nearest cache.
-const ROOM: usize = 1024;
 
 /// Where one stands that is near nobody.
 const NOBODY: usize = ROOM - 1;
@@ -71,6 +69,7 @@ pub struct Near<const D: usize> {
     /// Of those that are near: squared distances, later weights, and something else.
     weights: [f64; ROOM],
     others: [f64; ROOM],
+    values: [f64; ROOM],
 }
 
 impl<const D: usize> Near<D> {
@@ -88,6 +87,7 @@ impl<const D: usize> Near<D> {
             n_found: 0,
             weights: [0.0; ROOM],
             others: [0.0; ROOM],
+            values: [0.0; ROOM],
         })
     }
 
@@ -159,9 +159,31 @@ impl<const D: usize> Near<D> {
         }
     }
 
+    /// Where the last of all candidates stands, and one.
+    #[inline(always)]
+    pub fn until(&self) -> usize {
+        let mut until = 0;
+        for row in 0..self.rows.len() {
+            let end = self.rows[row].end;
+            until = if end > until { end } else { until };
+        }
+        until
+    }
+
     /// Copies the next candidates together, with what they have in each of the sources; whether there were any left.
     #[inline(always)]
     pub fn fill(&mut self, crowd: &Crowd<D>, sources: &[&[f64]]) -> bool {
+        self.copy::<true>(crowd, sources)
+    }
+
+    /// The same without places: of these is known who is near.
+    #[inline(always)]
+    pub fn fill_again(&mut self, crowd: &Crowd<D>, sources: &[&[f64]]) -> bool {
+        self.copy::<false>(crowd, sources)
+    }
+
+    #[inline(always)]
+    fn copy<const HAS_PLACES: bool>(&mut self, crowd: &Crowd<D>, sources: &[&[f64]]) -> bool {
         if self.n_rows == self.rows.len() {
             return false;
         }
@@ -179,7 +201,7 @@ impl<const D: usize> Near<D> {
                 self.n_within = 0;
             }
             let whole = taken.next_multiple_of(PIECE);
-            for axis in 0..D {
+            for axis in 0..if HAS_PLACES { D } else { 0 } {
                 let (sign, shift) = (image.sign[axis], image.shift[axis]);
                 let (source, _) = crowd.y[axis][start..start + whole].as_chunks::<PIECE>();
                 let (target, _) = self.places[axis][n..n + whole].as_chunks_mut::<PIECE>();
@@ -202,7 +224,7 @@ impl<const D: usize> Near<D> {
             n += taken;
         }
         self.n = n.next_multiple_of(SIFTED);
-        for axis in 0..D {
+        for axis in 0..if HAS_PLACES { D } else { 0 } {
             for place in &mut self.places[axis][n..self.n] {
                 *place = FAR;
             }
@@ -275,19 +297,124 @@ impl<const D: usize> Near<D> {
     /// Squared distances become values of a kernel.
     #[inline(always)]
     pub fn weigh<K: Radial>(&mut self, kernel: K, square: f64) {
+        if K::HAS_PARTS {
+            return self.weigh_in_parts(kernel, square);
+        }
         for weight in &mut self.weights[..self.n_found] {
             let value = kernel.value(*weight);
             *weight = if *weight < square { value } else { 0.0 };
         }
     }
 
+    /// The same in two loops: what waits for each other within one of them is half as much.
+    #[inline(always)]
+    fn weigh_in_parts<K: Radial>(&mut self, kernel: K, square: f64) {
+        let (weights, rests) = (&mut self.weights[..self.n_found], &mut self.others[..self.n_found]);
+        for at in 0..weights.len() {
+            let (scale, rest) = kernel.parts(weights[at]);
+            rests[at] = rest;
+            weights[at] = if weights[at] < square { scale } else { 0.0 };
+        }
+        for at in 0..weights.len() {
+            weights[at] *= kernel.of_rest(rests[at]);
+        }
+    }
+
     /// Squared distances become what two exchange by.
     #[inline(always)]
     pub fn force<K: Radial>(&mut self, kernel: K, square: f64) {
+        if K::IS_ITS_OWN_FORCE {
+            return self.weigh(kernel, square);
+        }
         for weight in &mut self.weights[..self.n_found] {
             let value = kernel.force(*weight);
             *weight = if *weight < square { value } else { 0.0 };
         }
+    }
+
+    /// How many were found, and what is missing in the last lanes.
+    #[inline(always)]
+    pub fn n_found(&self) -> usize {
+        self.n_found
+    }
+
+    /// Squared distances become values of a kernel; these, or what two exchange by, are noted with whose they are.
+    #[inline(always)]
+    pub fn weigh_and_note<K: Radial>(
+        &mut self,
+        (kernel, square, notes_forces): (K, f64, bool),
+        found: &mut [u8],
+        noted: &mut [f64],
+    ) {
+        let n = self.n_found.min(noted.len());
+        let (found, _) = found.as_chunks_mut::<{ 2 * LANES }>();
+        let (source, _) = self.found[..2 * n].as_chunks::<{ 2 * LANES }>();
+        // A call to copy so few costs more than the loop.
+        #[allow(clippy::manual_memcpy)]
+        for piece in 0..found.len().min(source.len()) {
+            found[piece] = source[piece];
+        }
+        if notes_forces && !K::IS_ITS_OWN_FORCE {
+            let (weights, noted) = (&self.weights[..n], &mut noted[..n]);
+            for at in 0..n {
+                let force = kernel.force(weights[at]);
+                noted[at] = if weights[at] < square { force } else { 0.0 };
+            }
+            return self.weigh(kernel, square);
+        }
+        self.weigh(kernel, square);
+        let (weights, noted) = (&self.weights[..n], &mut noted[..n]);
+        #[allow(clippy::manual_memcpy)]
+        for at in 0..n {
+            noted[at] = weights[at];
+        }
+    }
+
+    /// What was noted of one parcel and the candidates at hand.
+    #[inline(always)]
+    pub fn recall(&mut self, found: &[u8], noted: &[f64]) {
+        self.n_found = noted.len();
+        self.found[..found.len()].copy_from_slice(found);
+        self.weights[..noted.len()].copy_from_slice(noted);
+    }
+
+    /// The same of the first two sources: adds the differences of the second, with forces that are divided by means of the
+    /// first or multiplied by it, and the sum of weights.
+    #[inline(always)]
+    pub fn recall_and_differ(
+        &mut self,
+        (found, noted): (&[u8], &[f64]),
+        (is_mean, factor, own): (bool, f64, f64),
+        (lanes, all_lanes): (&mut [f64; LANES], &mut [f64; LANES]),
+    ) {
+        let [factors, column, ..] = &self.carried[..] else { return };
+        let n = noted.len();
+        let (others, values) = (&mut self.others[..n], &mut self.values[..n]);
+        pick_two((factors, column), found, others, values);
+        let (others, _) = others.as_chunks::<LANES>();
+        let (values, _) = values.as_chunks::<LANES>();
+        let (noted, _) = noted.as_chunks::<LANES>();
+        let (mut sums, mut all) = (*lanes, *all_lanes);
+        let n = others.len().min(values.len()).min(noted.len());
+        // A choice within the loop would keep it from being vectorised.
+        if is_mean {
+            for piece in 0..n {
+                for lane in 0..LANES {
+                    let weight = noted[piece][lane] * (2.0 / (factor + others[piece][lane]));
+                    all[lane] += weight;
+                    sums[lane] += weight * (values[piece][lane] - own);
+                }
+            }
+        } else {
+            for piece in 0..n {
+                for lane in 0..LANES {
+                    let weight = noted[piece][lane] * (factor * others[piece][lane]);
+                    all[lane] += weight;
+                    sums[lane] += weight * (values[piece][lane] - own);
+                }
+            }
+        }
+        (*lanes, *all_lanes) = (sums, all);
     }
 
     /// `w_ij ← 2 w_ij / (ρ_i + ρ_j)`
@@ -354,44 +481,8 @@ impl<const D: usize> Near<D> {
     }
 }
 
-/// What those that are near have, side by side.
-#[inline(always)]
-fn pick(source: &[f64; ROOM], found: &[u8; 2 * ROOM], target: &mut [f64]) {
-    let (target, _) = target.as_chunks_mut::<LANES>();
-    let (found, _) = found.as_chunks::<{ 2 * LANES }>();
-    for piece in 0..target.len().min(found.len()) {
-        for k in 0..LANES {
-            let idx = u16::from_le_bytes([found[piece][2 * k], found[piece][2 * k + 1]]);
-            target[piece][k] = source[usize::from(idx) % ROOM];
-        }
-    }
-}
-
 /// A sum of lanes, in a fixed order.
 #[inline(always)]
 pub fn folded(lanes: [f64; LANES]) -> f64 {
     ((lanes[0] + lanes[4]) + (lanes[2] + lanes[6])) + ((lanes[1] + lanes[5]) + (lanes[3] + lanes[7]))
-}
-
-/// Four numbers of 16 bits that are one.
-const ONES: u64 = 0x0001_0001_0001_0001;
-
-/// By the bits of a mask: which of eight are set, one after the other, in 16 bits each.
-static SETS: [[u64; 2]; 1 << LANES] = sets();
-
-const fn sets() -> [[u64; 2]; 1 << LANES] {
-    let mut sets = [[0; 2]; 1 << LANES];
-    let mut mask = 0;
-    while mask < sets.len() {
-        let (mut bit, mut n) = (0, 0);
-        while bit < LANES {
-            if mask >> bit & 1 == 1 {
-                sets[mask][n / 4] |= (bit as u64) << (16 * (n % 4));
-                n += 1;
-            }
-            bit += 1;
-        }
-        mask += 1;
-    }
-    sets
 }

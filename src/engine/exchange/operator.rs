@@ -6,18 +6,18 @@
 
 use super::super::parallel::{self, Pool};
 use super::around::Around;
+use super::bands::Recalling;
 use super::local::Metrics;
 use super::near::{Crowd, LANES, MOST_TARGETS, Near, PADDING, folded};
+use super::notes::{Noted, Notes};
 use super::own_kernels::OnOwnKernels;
 use super::table::Tabulated;
-use crate::catalog::kernel::{
-    CubicSpline, Epanechnikov, Gaussian, QuinticSpline, Radial, WendlandC2, WendlandC4, WendlandC6,
-};
+use crate::catalog::kernel::Radial;
 use crate::maths::wide::Width;
 use crate::plan::exchange::{Exchange, Kernel, Normalisation};
 
 /// Parcels that a thread takes at once.
-const PORTION: usize = 512;
+pub(super) const PORTION: usize = 512;
 
 /// Sums of Sinkhorn's weights are one to this.
 const UNIT: f64 = 1e-12;
@@ -63,6 +63,29 @@ pub enum Weights {
     Values,
 }
 
+/// Work with a kernel that is known when it is compiled.
+macro_rules! with_kernel {
+    ($profile:expr, $kernel:ident => $work:expr) => {{
+        use $crate::catalog::kernel;
+        use $crate::engine::exchange::operator::Profile;
+        match $profile {
+            Profile::Gaussian => with_kernel!(@ kernel::Gaussian, $kernel => $work),
+            Profile::CubicSpline => with_kernel!(@ kernel::CubicSpline, $kernel => $work),
+            Profile::QuinticSpline => with_kernel!(@ kernel::QuinticSpline, $kernel => $work),
+            Profile::WendlandC2 => with_kernel!(@ kernel::WendlandC2, $kernel => $work),
+            Profile::WendlandC4 => with_kernel!(@ kernel::WendlandC4, $kernel => $work),
+            Profile::WendlandC6 => with_kernel!(@ kernel::WendlandC6, $kernel => $work),
+            Profile::Epanechnikov => with_kernel!(@ kernel::Epanechnikov, $kernel => $work),
+            Profile::Own(table) => with_kernel!(@ table.radial(), $kernel => $work),
+        }
+    }};
+    (@ $own:expr, $kernel:ident => $work:expr) => {{
+        let $kernel = $own;
+        $work
+    }};
+}
+pub(super) use with_kernel;
+
 /// Everything that the weights of one set of positions are made of.
 pub struct Operator<'a, const D: usize> {
     pub crowd: Crowd<'a, D>,
@@ -76,6 +99,8 @@ pub struct Operator<'a, const D: usize> {
     pub own_lists: &'a Pool<Around>,
     /// Densities, or the factors of a product; by parcel.
     pub factors: Vec<f64>,
+    /// What is known of pairs.
+    pub notes: Notes,
     /// What keeps sums of weights below one, by parcel; empty where nothing has to.
     pub caps: Vec<f64>,
 }
@@ -102,7 +127,12 @@ impl<'a, const D: usize> Operator<'a, D> {
     pub fn weigh(&mut self) {
         self.factors.clear();
         let mut densities = vec![0.0; self.crowd.n + PADDING];
-        self.pass(Wanted::Densities, &mut [&mut densities]);
+        if self.notes.are_taken() && self.metrics.is_none() {
+            let is_balanced = self.normalisation == Normalisation::Sinkhorn;
+            self.note(if is_balanced { Noted::Values } else { self.noted() }, &mut densities, true);
+        } else {
+            self.pass(Wanted::Densities, &mut [&mut densities]);
+        }
         match self.normalisation {
             Normalisation::Arithmetic => {}
             Normalisation::Geometric => densities.iter_mut().for_each(|value| *value = 1.0 / value.sqrt()),
@@ -141,16 +171,7 @@ impl<'a, const D: usize> Operator<'a, D> {
     }
 
     fn pass(&self, wanted: Wanted, targets: &mut [&mut [f64]]) {
-        match self.profile {
-            Profile::Gaussian => self.pass_with(Gaussian, wanted, targets),
-            Profile::CubicSpline => self.pass_with(CubicSpline, wanted, targets),
-            Profile::QuinticSpline => self.pass_with(QuinticSpline, wanted, targets),
-            Profile::WendlandC2 => self.pass_with(WendlandC2, wanted, targets),
-            Profile::WendlandC4 => self.pass_with(WendlandC4, wanted, targets),
-            Profile::WendlandC6 => self.pass_with(WendlandC6, wanted, targets),
-            Profile::Epanechnikov => self.pass_with(Epanechnikov, wanted, targets),
-            Profile::Own(table) => self.pass_with(table.radial(), wanted, targets),
-        }
+        with_kernel!(self.profile, kernel => self.pass_with(kernel, wanted, targets));
     }
 
     fn pass_with<K: Radial + Sync>(&self, kernel: K, wanted: Wanted, targets: &mut [&mut [f64]]) {
@@ -169,9 +190,23 @@ impl<'a, const D: usize> Operator<'a, D> {
             });
             return;
         }
+        let is_noted =
+            self.notes.serve(kernel, self.is_by_forces() && matches!(wanted, Wanted::Differences(_)));
         parallel::for_each(&mut portions, &|idx, targets| {
             self.lists.lend(Near::new, |near| {
                 let (operator, first) = (self, idx * PORTION);
+                if let Some(note) = self.notes.whole(idx).filter(|_| is_noted) {
+                    let own_force = self.own_force(kernel);
+                    return self.width.run(Recalling {
+                        operator,
+                        wanted,
+                        first,
+                        targets,
+                        near,
+                        note,
+                        own_force,
+                    });
+                }
                 self.width.run(OnPortion { operator, kernel, wanted, first, targets, near });
             });
         });
@@ -179,13 +214,13 @@ impl<'a, const D: usize> Operator<'a, D> {
 }
 
 /// Some parcels of a pass, to be dispatched to wide or narrow code.
-struct OnPortion<'a, 'b, const D: usize, K> {
-    operator: &'a Operator<'b, D>,
-    kernel: K,
-    wanted: Wanted<'a>,
-    first: usize,
-    targets: &'a mut [&'b mut [f64]],
-    near: &'a mut Near<D>,
+pub(super) struct OnPortion<'a, 'b, const D: usize, K> {
+    pub operator: &'a Operator<'b, D>,
+    pub kernel: K,
+    pub wanted: Wanted<'a>,
+    pub first: usize,
+    pub targets: &'a mut [&'b mut [f64]],
+    pub near: &'a mut Near<D>,
 }
 
 impl<const D: usize, K: Radial> pulp::NullaryFnOnce for OnPortion<'_, '_, D, K> {
@@ -217,7 +252,8 @@ impl<const D: usize, K: Radial> pulp::NullaryFnOnce for OnPortion<'_, '_, D, K> 
                     self.targets[sum][at + target] = folded(lanes[target * n_sums + sum]);
                 }
             }
-            self.leave_out_itself(first, at, n_targets);
+            let own_force = operator.own_force(self.kernel);
+            operator.leave_out_itself((self.wanted, own_force), self.targets, (first, at, n_targets));
             at += n_targets;
         }
     }
@@ -243,37 +279,70 @@ impl<const D: usize, K: Radial> OnPortion<'_, '_, D, K> {
                     Weights::Forces => near.force(kernel, square),
                     Weights::Values => near.weigh(kernel, square),
                 }
-                let first = operator.normalise(near, idx);
-                for column in 0..columns.len() {
-                    near.difference(first + column, columns[column][idx], &mut lanes[column]);
-                }
-                if lanes.len() > columns.len() {
-                    near.sum(&mut lanes[columns.len()]);
-                }
-            }
-        }
-    }
-
-    /// Takes each parcel's own weight out of its sum of weights.
-    #[inline(always)]
-    fn leave_out_itself(&mut self, first: usize, at: usize, n_targets: usize) {
-        let Wanted::Differences(columns) = self.wanted else { return };
-        if self.targets.len() > columns.len() {
-            let force = match self.operator.weights {
-                Weights::Forces => self.kernel.force(0.0),
-                Weights::Values => self.kernel.value(0.0),
-            };
-            for target in 0..n_targets {
-                let own = self.operator.own_weight(force, first + target);
-                self.targets[columns.len()][at + target] -= own;
+                operator.differ(near, columns, idx, lanes);
             }
         }
     }
 }
 
 impl<'a, const D: usize> Operator<'a, D> {
+    /// Adds differences, by forces that are at hand.
+    #[inline(always)]
+    pub(super) fn differ(
+        &self,
+        near: &mut Near<D>,
+        columns: &[Vec<f64>],
+        idx: usize,
+        lanes: &mut [[f64; LANES]],
+    ) {
+        let first = self.normalise(near, idx);
+        for column in 0..columns.len() {
+            near.difference(first + column, columns[column][idx], &mut lanes[column]);
+        }
+        if lanes.len() > columns.len() {
+            near.sum(&mut lanes[columns.len()]);
+        }
+    }
+
+    /// Takes each parcel's own weight out of its sum of weights.
+    #[inline(always)]
+    pub(super) fn leave_out_itself(
+        &self,
+        (wanted, own_force): (Wanted, f64),
+        targets: &mut [&mut [f64]],
+        (first, at, n_targets): (usize, usize, usize),
+    ) {
+        let Wanted::Differences(columns) = wanted else { return };
+        if targets.len() > columns.len() {
+            for target in 0..n_targets {
+                targets[columns.len()][at + target] -= self.own_weight(own_force, first + target);
+            }
+        }
+    }
+
+    pub(super) fn is_by_forces(&self) -> bool {
+        self.weights == Weights::Forces
+    }
+
+    /// What notes have to be for differences.
+    pub(super) fn noted(&self) -> Noted {
+        match self.weights {
+            Weights::Forces => Noted::Forces,
+            Weights::Values => Noted::Values,
+        }
+    }
+
+    /// What a parcel exchanges with itself by.
+    #[inline(always)]
+    pub(super) fn own_force<K: Radial>(&self, kernel: K) -> f64 {
+        match self.weights {
+            Weights::Forces => kernel.force(0.0),
+            Weights::Values => kernel.value(0.0),
+        }
+    }
+
     /// What a pass needs of every neighbour.
-    fn sources<'s>(&'s self, wanted: Wanted<'s>) -> Vec<&'s [f64]> {
+    pub(super) fn sources<'s>(&'s self, wanted: Wanted<'s>) -> Vec<&'s [f64]> {
         match wanted {
             Wanted::Densities => Vec::new(),
             Wanted::Weighted(factors) => vec![factors],

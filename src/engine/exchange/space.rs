@@ -49,6 +49,8 @@ pub struct Space<const D: usize> {
     reach: f64,
     reach_square: f64,
     slack: f64,
+    /// Between which parcels may be along each axis: beyond an open side anywhere.
+    within: [(f64, f64); D],
     /// Without the particles themselves.
     images: Vec<Image<D>>,
 }
@@ -81,9 +83,11 @@ impl<const D: usize> Space<D> {
             reach: radius * (1.0 + SLACK),
             reach_square: radius * radius,
             slack: radius * SLACK,
+            within: [(f64::NEG_INFINITY, f64::INFINITY); D],
             images: Vec::new(),
         };
         space.enclose(axes);
+        space.within = space.reached(axes);
         space.divide(n_particles);
         let reach = std::array::from_fn(|axis| space.radius / space.rows[axis][axis]);
         space.images = space.images_of(axes, reach);
@@ -115,6 +119,7 @@ impl<const D: usize> Space<D> {
             reach: 0.0,
             reach_square: 0.0,
             slack: 0.0,
+            within: [(f64::NEG_INFINITY, f64::INFINITY); D],
             images: Vec::new(),
         };
         // Half of a reach across: rows that a kernel touches hold less that is out of reach. A cell is no smaller than the
@@ -122,6 +127,7 @@ impl<const D: usize> Space<D> {
         let least = |axis: usize| 1e-9 * (high(axis) - low(axis));
         let part = |axis: usize| if axis + 1 == D { 1.0 / ALONG } else { 0.5 };
         space.cut(n_particles, std::array::from_fn(|axis| (part(axis) * reach[axis]).max(least(axis))));
+        space.within = space.reached(axes);
         space.images = space.images_of(axes, widest);
         space
     }
@@ -277,12 +283,26 @@ impl<const D: usize> Space<D> {
         (0..D).any(|row| (row + 1..D).any(|column| self.rows[row][column] != 0.0))
     }
 
-    /// Whether anything of the domain may be within the radius of a box.
+    /// The box of the domain, without end where a side is open.
+    fn reached(&self, axes: &[Axis]) -> [(f64, f64); D] {
+        let is_open = |axis: &Axis| axis.low_side == Side::Open || axis.high_side == Side::Open;
+        if self.is_sheared() && axes.iter().any(is_open) {
+            return [(f64::NEG_INFINITY, f64::INFINITY); D];
+        }
+        let end = |side: Side, end: f64, far: f64| if side == Side::Open { far } else { end };
+        std::array::from_fn(|axis| {
+            let low = end(axes[axis].low_side, self.low[axis], f64::NEG_INFINITY);
+            (low, end(axes[axis].high_side, self.high[axis], f64::INFINITY))
+        })
+    }
+
+    /// Whether any parcel may be within the radius of a box.
     #[inline(always)]
     pub fn is_near(&self, (low, high): ([f64; D], [f64; D])) -> bool {
         let mut is_near = true;
         for axis in 0..D {
-            is_near &= high[axis] > self.low[axis] - self.radius && low[axis] < self.high[axis] + self.radius;
+            let (first, last) = self.within[axis];
+            is_near &= high[axis] > first - self.radius && low[axis] < last + self.radius;
         }
         is_near
     }

@@ -61,11 +61,13 @@ impl Needs {
         unreacted.iter_mut().zip(&reacted).for_each(|(unreacted, reacted)| *unreacted |= reacted);
         let any = |kinds: &[OutputKind]| outputs.iter().any(|&idx| kinds.contains(&plan.outputs[idx].kind));
         let has_mean = program.terms.iter().any(|term| matches!(term, Term::Mean { .. }));
-        let errs = has_mean && any(&[OutputKind::Profile, OutputKind::Map]);
+        let follows = has_mean || program.mean_slot().is_some();
+        let errs = follows && any(&[OutputKind::Profile, OutputKind::Map]);
         let mixed =
             (program.has_mixing() && any(&[OutputKind::Mixing])) || (has_mean && unreacted.contains(&true));
         // Outside open sides a particle is its own mean.
-        let simulated = any(&[OutputKind::Mixing]) || errs || (mixed && program.grid.has_open_side());
+        let simulated =
+            any(&[OutputKind::Mixing]) || (has_mean && errs) || (mixed && program.grid.has_open_side());
         Self { unreacted, reacted, reactions, simulated, mixed, slopes: errs }
     }
 

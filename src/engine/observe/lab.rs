@@ -127,6 +127,8 @@ pub struct Lab<const D: usize> {
     pub simulated: Vec<[f64; CHUNK]>,
     /// Per component ū as the particle sees it.
     pub mixed: Vec<[f64; CHUNK]>,
+    /// Per component what it is made of, without the mean of it that the particle sees.
+    pub gaps: Vec<[f64; CHUNK]>,
     /// Whether `mixed` holds the means of this instant already.
     is_mixed_known: bool,
     /// Per component U.
@@ -155,6 +157,7 @@ impl<const D: usize> Lab<D> {
             columns: vec![vec![0.0; CHUNK]; program.n_columns()],
             simulated: zeros(program.n_components()),
             mixed: zeros(program.n_components()),
+            gaps: zeros(program.n_components()),
             is_mixed_known: false,
             components: zeros(program.plan.components.len()),
             unreacted: zeros(n_species),
@@ -258,6 +261,17 @@ pub fn resolve<const D: usize>(
             let (mixed, target) = (&lab.mixed[component][..n], &mut lab.components[component][..n]);
             total(&program.terms, columns, mixed, target);
         }
+        if needs.slopes {
+            let gap = &mut lab.gaps[component][..n];
+            match program.mean_slot() {
+                None => subtract(&lab.simulated[component][..n], &lab.mixed[component][..n], gap),
+                Some(slot) => {
+                    let mut values = [0.0; CHUNK];
+                    weighted(&program.mean_weights, columns, &mut values[..n]);
+                    subtract(&values[..n], &columns[slot][..n], gap);
+                }
+            }
+        }
     }
     for (target, bins) in lab.components[program.n_components()..].iter_mut().zip(&run.reactions.immobile) {
         for idx in 0..n {
@@ -290,6 +304,13 @@ fn equilibrate<const D: usize>(run: &Run<D>, lab: &mut Lab<D>) {
     }
     for &idx in &speciation.species {
         lab.species[idx][..n].copy_from_slice(&lab.speciated[idx][..n]);
+    }
+}
+
+#[inline(always)]
+fn subtract(a: &[f64], b: &[f64], target: &mut [f64]) {
+    for idx in 0..target.len() {
+        target[idx] = a[idx] - b[idx];
     }
 }
 

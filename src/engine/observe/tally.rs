@@ -93,7 +93,12 @@ impl Follow {
             Term::Mean { fraction } => fraction,
             Term::Column { .. } => 0.0,
         };
-        let share = program.terms.iter().map(fraction).sum();
+        let of_bins: f64 = program.terms.iter().map(fraction).sum();
+        let stored = |term: &Term| match *term {
+            Term::Column { slot, fraction } if Some(slot) == program.mean_slot() => fraction,
+            Term::Column { .. } | Term::Mean { .. } => 0.0,
+        };
+        let share = of_bins + program.terms.iter().map(stored).sum::<f64>();
         let n_components = if share > 0.0 { program.n_components() } else { 0 };
         Self { share, n_components }
     }
@@ -379,7 +384,7 @@ fn add_influences<const D: usize>(
             let mut influence = lab.species[species[column]][idx] - bin[1 + column] / bin[0];
             for k in 0..follow.n_components {
                 let slope = bin[1 + n_species + column * follow.n_components + k] / bin[0];
-                influence += follow.share * slope * (lab.simulated[k][idx] - lab.mixed[k][idx]);
+                influence += follow.share * slope * lab.gaps[k][idx];
             }
             target[column] += influence * influence;
         }

@@ -12,8 +12,8 @@ pub(super) fn run(draft: &mut Draft) {
         draft.plan.stages.retain(|stage| *stage != Stage::Exchange);
         draft.leave_out("exchange between parcels", "they carry nothing that differs from place to place");
     }
-    let means = draft.plan.mixing.as_mut().and_then(|mixing| mixing.averaging.take());
-    if means.is_some() {
+    if draft.plan.has_kernel_mean() {
+        draft.plan.mixing = None;
         draft.plan.stages.retain(|stage| *stage != Stage::KernelMean);
         draft.leave_out(
             "means over the parcels around",

@@ -162,7 +162,7 @@ pub(super) fn sweeps<'a>(
         }
         let sweep = sweep(checker, *span, written, parameters, measures);
         if !statements.has_bins() {
-            bins_of_nothing(checker, sweep.as_ref());
+            bins_of_nothing(checker, statements, sweep.as_ref());
         }
         list.extend(sweep);
     }
@@ -281,7 +281,7 @@ fn bounded(checker: &mut Checker<'_>, sweep: &Sweep, span: Span) {
 }
 
 /// An axis of bins would set nothing where the scene has no average.
-fn bins_of_nothing(checker: &mut Checker<'_>, sweep: Option<&Sweep>) {
+fn bins_of_nothing(checker: &mut Checker<'_>, statements: &Statements<'_>, sweep: Option<&Sweep>) {
     let axes = sweep.into_iter().flat_map(|sweep| sweep.groups.iter().flatten());
     for axis in axes.filter(|axis| axis.target == Target::Bins) {
         checker.report(
@@ -289,7 +289,7 @@ fn bins_of_nothing(checker: &mut Checker<'_>, sweep: Option<&Sweep>) {
                 .at(axis.span, "of which average?")
                 .found("no `average bins`")
                 .expected("an `average bins` statement in the scene")
-                .help("add for example `average bins 100`"),
+                .help(statements.bins_help(100)),
         );
     }
 }
