@@ -106,6 +106,9 @@ fn compare_all(in_plane: bool, in_space: bool) {
 
 fn main() {
     let has = |word: &str| std::env::args().any(|argument| argument == word);
+    if has("sizes") {
+        return sizes();
+    }
     compare_all(!has("space"), !has("plane"));
     if has("space") || has("plane") {
         return;
@@ -115,6 +118,10 @@ fn main() {
             tell(d, 100_000, item.name, 30.0, 1);
         }
     }
+    sizes();
+}
+
+fn sizes() {
     for n in [100_000, 1_000_000, 10_000_000] {
         tell(2, n, "gaussian", 30.0, 1);
         tell(2, n, "gaussian", 30.0, 2);

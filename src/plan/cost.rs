@@ -26,7 +26,8 @@ mod table {
     pub(super) const PARCEL: [f64; 3] = [60.0, 105.0, 200.0];
     pub(super) const PAIR: [f64; 3] = [3.5, 3.3, 7.4];
     pub(super) const PAIR_VALUE: f64 = 0.6;
-    /// One parcel, and one neighbour weighed, of which another sum has noted what it found. In space not all notes have room.
+    /// One parcel, and one neighbour weighed, of which another sum has noted what it found. In space a parcel has more
+    /// candidates to each of these.
     pub(super) const NOTED: [f64; 3] = [50.0, 50.0, 200.0];
     pub(super) const NOTED_PAIR: [f64; 3] = [0.6, 0.6, 3.0];
     /// Neighbours where each parcel has a kernel of its own: more of them are looked at.
