@@ -118,7 +118,7 @@ fn seed(root: u64, group: usize) -> u64 {
 fn fewer(plan: &Plan) -> Plan {
     let mut plan = watched(plan);
     let count = plan.particles.count.div_ceil(FEWER);
-    let averaging = plan.mixing.as_ref().and_then(|mixing| mixing.averaging.as_ref());
+    let averaging = plan.averaging();
     let bandwidth = averaging.map(|averaging| averaging.extents(&plan).bandwidth);
     plan.set_count(count);
     if let (Some(bandwidth), Some(averaging)) = (bandwidth, averaging_of(&mut plan)) {

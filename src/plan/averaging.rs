@@ -4,9 +4,8 @@
 //! deliberately disperses nothing.
 
 use super::Plan;
-use super::exchange::{Cutoff, Exchange, Integration, Kernel, Normalisation};
+use super::exchange::{Cutoff, Exchange, Integration, Kernel, Normalisation, radial_moment};
 use super::tape::Tape;
-use crate::maths::quadrature::integrate;
 use serde::{Deserialize, Serialize};
 
 /// A mean with a kernel, in place of that of a bin.
@@ -65,13 +64,8 @@ impl Averaging {
         let exchange = self.as_exchange(d);
         let sizes = exchange.sizes(plan, plan.time.step);
         let (profile, _) = exchange.profile();
-        let breaks: Vec<f64> =
-            (0..=8).map(f64::from).filter(|at| *at < sizes.radius).chain([sizes.radius]).collect();
-        let power = |q: f64, n: usize| (0..n).map(|_| q).product::<f64>();
-        let moment =
-            |k: usize| integrate(|q| profile(q).0 * power(q, d - 1 + k), &breaks, 1e-300, 1e-12).value;
-        let square = |q: f64| profile(q).0 * profile(q).0 * power(q, d - 1);
-        let square = integrate(square, &breaks, 1e-300, 1e-12).value;
+        let moment = |k: usize| radial_moment(|q| profile(q).0, d - 1 + k, sizes.radius);
+        let square = radial_moment(|q| profile(q).0 * profile(q).0, d - 1, sizes.radius);
         let surface = [2.0, 2.0 * std::f64::consts::PI, 4.0 * std::f64::consts::PI][d.clamp(1, 3) - 1];
         let h = sizes.bandwidth;
         Extents {
@@ -80,7 +74,8 @@ impl Averaging {
             radius: sizes.radius,
             neighbours: sizes.neighbours,
             variance: h * h * moment(2) / (d as f64 * moment(0)),
-            effective: surface * moment(0) * moment(0) / square * power(h / sizes.spacing, d),
+            effective: surface * moment(0) * moment(0) / square
+                * (0..d).map(|_| h / sizes.spacing).product::<f64>(),
         }
     }
 }

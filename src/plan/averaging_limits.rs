@@ -4,6 +4,7 @@
 //! deliberately asks nothing about single parcels.
 
 use super::averaging::Extents;
+use super::exchange_limits::MOST_NEIGHBOURS;
 use super::limits::{
     FEW_PER_BIN, Limit, TOO_FEW_PER_BIN, VISIBLE_DISPERSION, VISIBLE_SPREADING, axis_name, dispersion, short,
     short_up,
@@ -14,9 +15,6 @@ use crate::diagnostic::codes::{N101, N103, N201, N203, N207};
 use crate::maths::scalar::pow;
 use crate::scenario::Scenario;
 use crate::source::Span;
-
-/// Neighbours of a parcel beyond which nobody waits.
-const MOST_NEIGHBOURS: f64 = 1e5;
 
 struct Sized<'a> {
     scenario: &'a Scenario,
@@ -33,7 +31,7 @@ pub(super) fn check(
     limits: &mut Vec<Limit>,
     diagnostics: &mut Vec<Diagnostic>,
 ) {
-    let averaging = plan.mixing.as_ref().and_then(|mixing| mixing.averaging.as_ref());
+    let averaging = plan.averaging();
     let (Some(averaging), Some(written)) = (averaging, &scenario.averaging) else { return };
     let sized = Sized { scenario, plan, extents: averaging.extents(plan), place: written.bandwidth.span };
     let Extents { spacing, bandwidth, variance, effective, .. } = sized.extents;

@@ -6,6 +6,7 @@
 //! species is an affine combination of components ([`super::Species`]). In equilibrium the totals of the
 //! primary species are such combinations, and the concentrations follow by speciation.
 
+use super::averaging::Averaging;
 use super::tape::{Operation, Register};
 pub use crate::scenario::{Activity, Integrator, Splitting};
 use serde::{Deserialize, Serialize};
@@ -177,9 +178,13 @@ impl super::Plan {
         self.mixing.is_some() && !self.has_kernel_mean()
     }
 
-    /// Whether zones exchange with means over the parcels around.
+    /// The means over the parcels around that zones exchange with, if these are not those of bins.
+    pub fn averaging(&self) -> Option<&Averaging> {
+        self.mixing.as_ref().and_then(|mixing| mixing.averaging.as_ref())
+    }
+
     pub fn has_kernel_mean(&self) -> bool {
-        self.mixing.as_ref().is_some_and(|mixing| mixing.averaging.is_some())
+        self.averaging().is_some()
     }
 
     /// Whether what a particle reacts with hangs on its bin: a mean, or what lives there.

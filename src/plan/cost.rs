@@ -180,7 +180,7 @@ fn own_values(plan: &Plan, n_values: f64) -> f64 {
 fn pair_bytes(plan: &Plan) -> f64 {
     let exchange = plan.exchange.as_ref().filter(|exchange| exchange.spreading.is_none());
     let exchanged = exchange.map_or(0.0, |exchange| all_pair_bytes(plan, exchange));
-    let averaging = plan.mixing.as_ref().and_then(|mixing| mixing.averaging.as_ref());
+    let averaging = plan.averaging();
     let averaged = averaging.map_or(0.0, |it| bytes_of_pairs(plan, it.extents(plan).neighbours));
     exchanged.min(MOST_PAIR_BYTES as f64) + averaged.min(MOST_PAIR_BYTES as f64)
 }
@@ -197,10 +197,23 @@ fn bytes_of_pairs(plan: &Plan, neighbours: f64) -> f64 {
 /// Nanoseconds per particle and step of an exchange. Parcels at rest are sorted, and their weights made, once in a run.
 fn exchange_cost(plan: &Plan, n_values: f64) -> f64 {
     let Some(exchange) = &plan.exchange else { return 0.0 };
-    let moves = plan.stages.iter().any(|stage| matches!(stage, Stage::Move | Stage::FusedStep));
-    let walks = moves || exchange.spreading.is_some();
+    let walks = parcels_walk(plan) || exchange.spreading.is_some();
     let [anew, applied] = exchange_parts(plan, exchange, n_values, walks);
-    applied + if walks { anew } else { table::STAND + anew / plan.time.n_steps.max(1) as f64 }
+    applied + per_step(plan, anew, walks)
+}
+
+fn parcels_walk(plan: &Plan) -> bool {
+    plan.stages.iter().any(|stage| matches!(stage, Stage::Move | Stage::FusedStep))
+}
+
+/// What has to be done anew where parcels walk, and once in a run where they rest.
+fn per_step(plan: &Plan, anew: f64, walks: bool) -> f64 {
+    if walks { anew } else { table::STAND + anew / plan.time.n_steps.max(1) as f64 }
+}
+
+/// The part of all pairs that there is room to remember.
+fn noted_share(all_bytes: f64) -> f64 {
+    all_bytes.min(MOST_PAIR_BYTES as f64) / all_bytes.max(1.0)
 }
 
 /// Means over the parcels around: weights, the sums of each rate, and the mean that is stored. All sums but the first are of
@@ -211,8 +224,7 @@ fn means_cost(plan: &Plan) -> f64 {
     let d = plan.axes.len();
     let axis = d.clamp(1, 3) - 1;
     let n = averaging.extents(plan).neighbours;
-    let all = bytes_of_pairs(plan, n);
-    let share = all.min(MOST_PAIR_BYTES as f64) / all.max(1.0);
+    let share = noted_share(bytes_of_pairs(plan, n));
     let sum = |n_values: f64| {
         let anew = table::PARCEL[axis] + n * (table::PAIR[axis] + table::PAIR_VALUE * n_values);
         let noted = table::NOTED[axis] + n * (table::NOTED_PAIR[axis] + table::PAIR_VALUE * n_values);
@@ -228,9 +240,7 @@ fn means_cost(plan: &Plan) -> f64 {
     let stored = if mixing.stores_mean() { 2.0 * sum(n_components).1 } else { 0.0 };
     let (weights, _) = averaging.as_exchange(d).sums(1.0);
     let anew = table::SORT + sum(0.0).0 + (weights - 1.0) * sum(1.0).1;
-    let moves = plan.stages.iter().any(|stage| matches!(stage, Stage::Move | Stage::FusedStep));
-    let anew = if moves { anew } else { table::STAND + anew / plan.time.n_steps.max(1) as f64 };
-    anew + zones + stored
+    per_step(plan, anew, parcels_walk(plan)) + zones + stored
 }
 
 /// Sums of an exponential step up to a rest of 1e-12, about: terms of a Poisson distribution.
@@ -261,11 +271,10 @@ fn exchange_parts(plan: &Plan, exchange: &Exchange, n_values: f64, are_noted: bo
     let looked_at = if has_notes { 1.0 } else { table::OWN_KERNELS } * sizes.neighbours;
     let sum = table::PARCEL[axis] + looked_at * (table::PAIR[axis] + table::PAIR_VALUE * n_values);
     let noted = table::NOTED[axis] + looked_at * (table::NOTED_PAIR[axis] + table::PAIR_VALUE * n_values);
-    let all = all_pair_bytes(plan, exchange);
     let share = match exchange.integration {
         _ if !has_notes => 0.0,
         Integration::Explicit if are_noted && weights <= 1.0 => 1.0,
-        _ => all.min(MOST_PAIR_BYTES as f64) / all.max(1.0),
+        _ => noted_share(all_pair_bytes(plan, exchange)),
     };
     let again = share * noted + (1.0 - share) * sum;
     [table::SORT + sum + (weights - 1.0) * again, applied * again]

@@ -210,13 +210,17 @@ impl Exchange {
 
     fn moments(&self, d: usize, radius: f64) -> Moments {
         let (profile, _) = self.profile();
-        let breaks: Vec<f64> = (0..=8).map(f64::from).filter(|at| *at < radius).chain([radius]).collect();
-        let power = |q: f64, n: usize| (0..n).map(|_| q).product::<f64>();
-        let mass = integrate(|q| profile(q).0 * power(q, d - 1), &breaks, 1e-300, 1e-13).value;
-        let force = [0, 2, 4]
-            .map(|k| integrate(|q| profile(q).1 * power(q, d - 1 + k), &breaks, 1e-300, 1e-13).value);
+        let mass = radial_moment(|q| profile(q).0, d - 1, radius);
+        let force = [0, 2, 4].map(|k| radial_moment(|q| profile(q).1, d - 1 + k, radius));
         Moments { mass, force }
     }
+}
+
+/// `∫ f(q) qⁿ dq` from 0 to a radius.
+pub(super) fn radial_moment(f: impl Fn(f64) -> f64, n: usize, radius: f64) -> f64 {
+    let breaks: Vec<f64> = (0..=8).map(f64::from).filter(|at| *at < radius).chain([radius]).collect();
+    let power = |q: f64| (0..n).map(|_| q).product::<f64>();
+    integrate(|q| f(q) * power(q), &breaks, 1e-300, 1e-13).value
 }
 
 /// `W` and `−W′/q` of a profile of the scene.

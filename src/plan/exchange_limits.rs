@@ -21,7 +21,7 @@ const SLACK: f64 = 0.05;
 /// What rounding may add to a share of one.
 const ROUNDING: f64 = 1e-9;
 /// Neighbours of a parcel, and seconds of one core for one step, beyond which nobody waits.
-const MOST_NEIGHBOURS: f64 = 1e5;
+pub(super) const MOST_NEIGHBOURS: f64 = 1e5;
 const LONGEST_STEP: f64 = 1e6;
 
 /// An exchange with what follows from its plan.

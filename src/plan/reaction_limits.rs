@@ -196,7 +196,7 @@ fn noise_of_means(
 ) {
     let n_bins: f64 = plan.axes.iter().map(|axis| axis.bins as f64).product();
     let is_well_mixed = plan.mixing.as_ref().is_some_and(|mixing| mixing.is_well_mixed);
-    let averaging = plan.mixing.as_ref().and_then(|mixing| mixing.averaging.as_ref());
+    let averaging = plan.averaging();
     if !is_well_mixed || !plan.moves() || n_bins <= 1.0 && averaging.is_none() {
         return;
     }

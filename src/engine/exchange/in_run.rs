@@ -44,6 +44,9 @@ impl<const D: usize> Run<'_, D> {
 
     /// The means that parcels see before anything happens.
     pub fn take_means(&mut self) -> Result<(), RunError> {
+        if self.program.mean_slot().is_none() {
+            return Ok(());
+        }
         self.exchange(Work { blends: true, ..Work::default() }, 0, 0.0)
     }
 

@@ -19,7 +19,7 @@ impl<const D: usize> Exchange<D> {
     /// The sums of a kernel mean; nothing where zones exchange with the means of bins.
     pub fn of_means(program: &Program<D>, settings: &Settings) -> Result<Option<Self>, RunError> {
         let plan = program.plan;
-        let averaging = plan.mixing.as_ref().and_then(|mixing| mixing.averaging.as_ref());
+        let averaging = plan.averaging();
         let Some(averaging) = averaging else { return Ok(None) };
         let planned = averaging.as_exchange(D);
         planned.check(D).map_err(|reason| unsound(&reason))?;
