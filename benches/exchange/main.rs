@@ -121,9 +121,14 @@ fn main() {
     sizes();
 }
 
+/// Of all sizes, or of those that are given as numbers.
 fn sizes() {
-    for n in [100_000, 1_000_000, 10_000_000] {
-        tell(2, n, "gaussian", 30.0, 1);
-        tell(2, n, "gaussian", 30.0, 2);
+    let given: Vec<u64> = std::env::args().filter_map(|argument| argument.parse().ok()).collect();
+    let all = [100_000, 1_000_000, 10_000_000];
+    for &n in if given.is_empty() { &all[..] } else { &given } {
+        for neighbours in [30.0, 113.0] {
+            tell(2, n, "gaussian", neighbours, 1);
+            tell(2, n, "gaussian", neighbours, 2);
+        }
     }
 }

@@ -48,7 +48,7 @@ pub enum Kernel {
 /// `W` and `−W′/q` over q.
 pub type Profile<'e> = Box<dyn Fn(f64) -> (f64, f64) + 'e>;
 
-/// Bytes of what a run remembers of pairs of parcels, at most.
+/// Bytes of what a run remembers of pairs of parcels, at most, on one thread; more threads have more.
 pub const MOST_PAIR_BYTES: usize = 12 << 20;
 
 /// What follows from a plan for its exchange.

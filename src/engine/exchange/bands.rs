@@ -1,23 +1,16 @@
 //! Sums that note what they find of pairs, and sums that are made of such notes.
 //!
-//! Owns the choice of what is noted, and the order of work in a step of parcels that walk. May use the operator, neighbours and
-//! notes. It deliberately changes no number: sums have the bits that they have without notes.
-//!
-//! A step of parcels that walk has two sums: densities, and differences weighed with them. Portions are taken through both in
-//! the order of cells, the second as soon as all that is near has its density, so that few notes are needed at once.
+//! Owns the choice of what is noted. May use the operator, neighbours and notes. It deliberately changes no number: sums have
+//! the bits that they have without notes.
 
 #![allow(clippy::needless_range_loop)] // Zipped iterators are not always inlined; these loops are hot.
 
 use super::super::parallel;
-use super::near::{LANES, MOST_TARGETS, Near, PADDING, folded};
-use super::notes::{Note, Noted, Notes, Reader, Sheets};
-use super::operator::{OnPortion, Operator, PORTION, Wanted, with_kernel};
+use super::near::{LANES, MOST_TARGETS, Near, Sources, folded};
+use super::notes::{Note, Noted, Reader, Sheets};
+use super::operator::{Operator, PORTION, Wanted, with_kernel};
 use crate::catalog::kernel::Radial;
 use crate::plan::exchange::{Integration, Normalisation};
-use std::ops::Range;
-
-/// Portions per thread that are begun together.
-const TOGETHER: usize = 2;
 
 /// Densities of some parcels, noted.
 pub struct Noting<'a, 'b, const D: usize, K> {
@@ -41,15 +34,15 @@ impl<const D: usize, K: Radial> pulp::NullaryFnOnce for Noting<'_, '_, D, K> {
         let square = crowd.space.radius * crowd.space.radius;
         let n = densities.len();
         let mut lanes = [[0.0; LANES]; MOST_TARGETS];
+        let none = Sources::default();
         let mut at = 0;
         while at < n {
             let n_targets = near.gather_round(crowd, first + at, n - at);
-            let until = near.until();
-            note.until = if until > note.until { until } else { note.until };
+            note.span = near.widen(note.span);
             for lanes in &mut lanes[..n_targets] {
                 *lanes = [0.0; LANES];
             }
-            while near.fill(crowd, &[]) {
+            while near.fill(crowd, &none) {
                 for target in 0..n_targets {
                     near.find(crowd, first + at + target);
                     let room = if note.is_whole() { note.room(near.n_found(), sheets) } else { None };
@@ -128,7 +121,7 @@ impl<const D: usize> Recalling<'_, '_, '_, D> {
             let mut all = [0.0; LANES];
             let all = rest.first_mut().unwrap_or(&mut all);
             let is_mean = operator.normalisation == Normalisation::Arithmetic;
-            let own = (is_mean, operator.factors[idx], column[idx]);
+            let own = (is_mean, operator.factors[idx - operator.start], column[idx]);
             return near.recall_and_differ((found, noted), own, (&mut first[0], all));
         }
         near.recall(found, noted);
@@ -138,22 +131,6 @@ impl<const D: usize> Recalling<'_, '_, '_, D> {
             Wanted::Differences(columns) => operator.differ(near, columns, idx, lanes),
         }
     }
-}
-
-/// A portion in one of its two sums.
-enum Task<'t, 'b> {
-    Densities { idx: usize, densities: &'t mut [f64], note: &'t mut Note },
-    Differences { idx: usize, targets: &'t mut [&'b mut [f64]], note: &'t Note },
-}
-
-/// How far a step of parcels that walk has come.
-struct Progress {
-    /// Portions that have their densities.
-    n_done: usize,
-    /// Those of them that wait for the densities of others, with notes.
-    waiting: Vec<usize>,
-    /// Sheets of the longest note so far.
-    n_sheets: usize,
 }
 
 impl<const D: usize> Operator<'_, D> {
@@ -200,134 +177,5 @@ impl<const D: usize> Operator<'_, D> {
             });
         }));
         self.notes = notes;
-    }
-
-    /// As [`Self::differences`], and before them the weights, where [`Self::prepare`] has left them out.
-    pub fn first_differences(&mut self, columns: &[Vec<f64>], targets: &mut [Vec<f64>]) {
-        if !self.factors.is_empty() {
-            return self.differences(columns, targets);
-        }
-        with_kernel!(self.profile, kernel => self.in_bands(kernel, columns, targets));
-    }
-
-    fn in_bands<K: Radial + Sync>(&mut self, kernel: K, columns: &[Vec<f64>], targets: &mut [Vec<f64>]) {
-        let n = self.crowd.n;
-        let n_portions = n.div_ceil(PORTION);
-        let mut notes = self.notes.take();
-        notes.of.resize_with(n_portions, Note::default);
-        self.factors.resize(n + PADDING, 0.0);
-        let mut portions: Vec<Vec<&mut [f64]>> = (0..n_portions).map(|_| Vec::new()).collect();
-        for target in targets {
-            portions.iter_mut().zip(target[..n].chunks_mut(PORTION)).for_each(|(own, part)| own.push(part));
-        }
-        let mut progress = Progress { n_done: 0, waiting: Vec::new(), n_sheets: 1 };
-        while progress.n_done < n_portions || !progress.waiting.is_empty() {
-            self.go_on(kernel, columns, &mut notes, (&mut portions, &mut progress));
-        }
-        self.notes = notes;
-        // What had no room.
-        let left = portions.iter_mut().enumerate().filter(|(_, targets)| !targets.is_empty());
-        let mut left: Vec<(usize, &mut Vec<&mut [f64]>)> = left.collect();
-        parallel::for_each(&mut left, &|_, (idx, targets)| {
-            self.lists.lend(Near::new, |near| {
-                let (operator, wanted) = (self as &Self, Wanted::Differences(columns));
-                self.width.run(OnPortion { operator, kernel, wanted, first: *idx * PORTION, targets, near });
-            });
-        });
-    }
-
-    /// Densities of the next portions, and differences of those that waited and know all that is near.
-    fn go_on<K: Radial + Sync>(
-        &mut self,
-        kernel: K,
-        columns: &[Vec<f64>],
-        notes: &mut Notes,
-        (portions, progress): (&mut [Vec<&mut [f64]>], &mut Progress),
-    ) {
-        let (n, n_done) = (self.crowd.n, progress.n_done);
-        let n_new = progress.n_next(notes).min(portions.len() - n_done);
-        let n_noted = notes.sheets.n_left() / progress.n_sheets;
-        let known = (n_done * PORTION).min(n);
-        notes.fresh.resize(n_new * PORTION, 0.0);
-        let (old, new) = notes.of.split_at_mut(n_done);
-        let mut tasks = Vec::with_capacity(n_new + progress.waiting.len());
-        for (at, (note, own)) in new.iter_mut().zip(notes.fresh.chunks_mut(PORTION)).enumerate() {
-            let idx = n_done + at;
-            if at < n_noted {
-                note.begin(&notes.sheets);
-            }
-            tasks.push(Task::Densities { idx, densities: &mut own[..PORTION.min(n - idx * PORTION)], note });
-        }
-        let is_ready = |idx: usize| old[idx].until <= known;
-        let (ready, waiting) = progress.waiting.iter().partition(|&&idx| is_ready(idx));
-        let ready: Vec<usize> = ready;
-        progress.waiting = waiting;
-        let mut targets: Vec<Vec<&mut [f64]>> =
-            ready.iter().map(|&idx| std::mem::take(&mut portions[idx])).collect();
-        for (&idx, targets) in ready.iter().zip(&mut targets) {
-            tasks.push(Task::Differences { idx, targets, note: &old[idx] });
-        }
-        parallel::for_each(&mut tasks, &|_, task| self.take_on(kernel, columns, task, &notes.sheets));
-        ready.iter().for_each(|&idx| notes.of[idx].forget(&notes.sheets));
-        let end = ((n_done + n_new) * PORTION).min(n);
-        for (factor, density) in self.factors[known..end].iter_mut().zip(&notes.fresh) {
-            *factor = match self.normalisation {
-                Normalisation::Arithmetic => *density,
-                _ => 1.0 / density.sqrt(),
-            };
-        }
-        progress.wait(n_done..n_done + n_new, notes);
-    }
-
-    fn take_on<K: Radial + Sync>(&self, kernel: K, columns: &[Vec<f64>], task: &mut Task, sheets: &Sheets) {
-        self.lists.lend(Near::new, |near| match task {
-            Task::Densities { idx, densities, note } => {
-                let (operator, first, notes_forces) = (self, *idx * PORTION, self.is_by_forces());
-                self.width.run(Noting {
-                    operator,
-                    kernel,
-                    first,
-                    densities,
-                    near,
-                    note,
-                    sheets,
-                    notes_forces,
-                });
-            }
-            Task::Differences { idx, targets, note } => {
-                let (operator, first, wanted) = (self, *idx * PORTION, Wanted::Differences(columns));
-                let own_force = self.own_force(kernel);
-                self.width.run(Recalling { operator, wanted, first, targets, near, note, own_force });
-            }
-        });
-    }
-}
-
-impl Progress {
-    /// Portions to begin together: enough for all threads, but no more than a third of the room is good for.
-    fn n_next(&self, notes: &Notes) -> usize {
-        let n_threads = parallel::n_threads();
-        (notes.sheets.most() / (3 * self.n_sheets)).clamp(n_threads, TOGETHER * n_threads)
-    }
-
-    /// New portions wait, if they have notes. Those that need the densities of the far end, of which they see an image, have
-    /// half of the room at most: it would not be free before that.
-    fn wait(&mut self, new: Range<usize>, notes: &mut Notes) {
-        let far = notes.of.len() / 2;
-        let is_far = |idx: usize, note: &Note| note.until > (idx + far) * PORTION;
-        let of_far = |idx: &usize| if is_far(*idx, &notes.of[*idx]) { notes.of[*idx].n_sheets() } else { 0 };
-        let mut n_far: usize = self.waiting.iter().map(of_far).sum();
-        for idx in new.clone() {
-            let note = &mut notes.of[idx];
-            let n_own = note.n_sheets();
-            self.n_sheets = self.n_sheets.max(n_own);
-            if is_far(idx, note) && 2 * (n_far + n_own) > notes.sheets.most() {
-                note.forget(&notes.sheets);
-            } else if is_far(idx, note) {
-                n_far += n_own;
-            }
-        }
-        self.n_done = new.end;
-        self.waiting.extend(new.filter(|&idx| notes.of[idx].is_whole()));
     }
 }

@@ -4,11 +4,15 @@
 //!
 //! All three solve `dv/dt = −L v` over a step in which `L` is scaled by the share β: `L v = −Σ_j w_ij (v_j − v_i)`.
 
-use super::operator::Operator;
+use super::super::parallel;
+use super::operator::{Operator, PORTION};
 use crate::plan::exchange::Integration;
 
 /// What a parcel gives away may reach all that it has, to rounding.
 const WHOLE: f64 = 1.0 + 1e-12;
+
+/// Values that a thread takes at once where little is done with each.
+const MANY: usize = 32 * PORTION;
 
 /// Residual of the implicit step over the right side.
 const RESIDUAL: f64 = 1e-14;
@@ -37,7 +41,19 @@ fn zeros(n_columns: usize, n: usize) -> Vec<Vec<f64>> {
 
 /// The largest sum of weights of others.
 fn largest(sums: &[f64]) -> f64 {
-    sums.iter().fold(0.0, |largest: f64, &sum| largest.max(sum))
+    let parts: Vec<&[f64]> = sums.chunks(MANY).collect();
+    let of_parts = parallel::map(parts.len(), &|part| {
+        parts[part].iter().fold(0.0, |largest: f64, &sum| largest.max(sum))
+    });
+    of_parts.into_iter().fold(0.0, f64::max)
+}
+
+/// `v ← v + factor u`
+fn add(values: &mut [f64], factor: f64, others: &[f64]) {
+    let mut parts: Vec<_> = values.chunks_mut(MANY).zip(others.chunks(MANY)).collect();
+    parallel::for_each(&mut parts, &|_, (values, others)| {
+        values.iter_mut().zip(*others).for_each(|(value, other)| *value += factor * other);
+    });
 }
 
 /// `v ← v + β Σ_j w_ij (v_j − v_i)`, with the weights of what would give more than it has cut down.
@@ -59,7 +75,7 @@ fn explicit<const D: usize>(operator: &mut Operator<D>, beta: f64, columns: &mut
         operator.caps.clear();
     }
     for (column, found) in columns.iter_mut().zip(&found) {
-        column.iter_mut().zip(found).for_each(|(value, change)| *value += beta * change);
+        add(column, beta, found);
     }
 }
 
@@ -146,17 +162,13 @@ pub fn exponential<const D: usize>(
         }
         k += 1.0;
         for (power, change) in power.iter_mut().zip(&found) {
-            power.iter_mut().zip(change).for_each(|(value, change)| *value += beta / scale * change);
+            add(power, beta / scale, change);
         }
         weight *= scale / k;
         left -= weight;
-        for (value, power) in columns.iter_mut().flatten().zip(power.iter().flatten()) {
-            *value += weight * power;
-        }
+        columns.iter_mut().zip(&power).for_each(|(column, power)| add(column, weight, power));
     }
     // What rounding and the end of the series left out belongs to the last one: sums stay what they were.
     let rest = left.max(0.0);
-    for (value, power) in columns.iter_mut().flatten().zip(power.iter().flatten()) {
-        *value += rest * power;
-    }
+    columns.iter_mut().zip(&power).for_each(|(column, power)| add(column, rest, power));
 }

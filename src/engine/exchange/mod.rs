@@ -17,11 +17,12 @@ mod operator;
 mod own_kernels;
 mod picks;
 mod space;
+mod stretch;
 mod table;
 
 use super::control::Settings;
 use super::error::RunError;
-use super::parallel::Pool;
+use super::parallel::{self, Pool};
 use super::program::{Program, Role, unsound};
 use crate::maths::wide::Width;
 use crate::plan::exchange::{Exchange as Planned, Integration, MOST_PAIR_BYTES, Sizes};
@@ -37,6 +38,9 @@ use operator::{Operator, Profile, Weights};
 use space::Space;
 
 pub use in_run::Exchanges;
+
+/// Threads that have room for notes of their own; more of them share it.
+const MOST_ROOMS: usize = 8;
 
 /// What lives as long as the run.
 pub struct Exchange<const D: usize> {
@@ -68,6 +72,11 @@ fn closed(plan: &Plan) -> Vec<Axis> {
         (axis.low_side, axis.high_side) = (of_side(low), of_side(high));
     }
     axes
+}
+
+/// Room for notes: what every thread needs to keep the pairs between its two sums.
+fn most_pair_bytes(settings: &Settings) -> usize {
+    settings.most_pair_bytes.unwrap_or(MOST_PAIR_BYTES * parallel::n_threads().min(MOST_ROOMS))
 }
 
 /// A value that is wrong after an exchange.
@@ -107,7 +116,7 @@ impl<const D: usize> Exchange<D> {
             profile,
             sorted: Sorted::default(),
             factors: Vec::new(),
-            notes: Notes::new(Sheets::new(settings.most_pair_bytes.unwrap_or(MOST_PAIR_BYTES))),
+            notes: Notes::new(Sheets::new(most_pair_bytes(settings))),
             columns: Vec::new(),
             lists: Pool::new(),
             own_lists: Pool::new(),
@@ -194,6 +203,7 @@ impl<const D: usize> Exchange<D> {
             lists: &self.lists,
             own_lists: &self.own_lists,
             factors: std::mem::take(&mut self.factors),
+            start: 0,
             notes: self.notes.take(),
             caps: Vec::new(),
         };

@@ -43,6 +43,14 @@ pub struct Crowd<'a, const D: usize> {
     pub first: &'a [u32],
 }
 
+/// What candidates have beside their places.
+#[derive(Default)]
+pub struct Sources<'a> {
+    /// The first parcel that there is anything of.
+    pub start: usize,
+    pub of: Vec<&'a [f64]>,
+}
+
 /// Candidates side by side in memory, seen at once through an image.
 #[derive(Debug, Clone, Copy)]
 struct Row<const D: usize> {
@@ -159,36 +167,36 @@ impl<const D: usize> Near<D> {
         }
     }
 
-    /// Where the last of all candidates stands, and one.
+    /// Widens a span to where the first of all candidates stands, and the last, and one.
     #[inline(always)]
-    pub fn until(&self) -> usize {
-        let mut until = 0;
+    pub fn widen(&self, (mut from, mut until): (usize, usize)) -> (usize, usize) {
         for row in 0..self.rows.len() {
-            let end = self.rows[row].end;
+            let Row { start, end, .. } = self.rows[row];
+            from = if start < from { start } else { from };
             until = if end > until { end } else { until };
         }
-        until
+        (from, until)
     }
 
     /// Copies the next candidates together, with what they have in each of the sources; whether there were any left.
     #[inline(always)]
-    pub fn fill(&mut self, crowd: &Crowd<D>, sources: &[&[f64]]) -> bool {
+    pub fn fill(&mut self, crowd: &Crowd<D>, sources: &Sources) -> bool {
         self.copy::<true>(crowd, sources)
     }
 
     /// The same without places: of these is known who is near.
     #[inline(always)]
-    pub fn fill_again(&mut self, crowd: &Crowd<D>, sources: &[&[f64]]) -> bool {
+    pub fn fill_again(&mut self, crowd: &Crowd<D>, sources: &Sources) -> bool {
         self.copy::<false>(crowd, sources)
     }
 
     #[inline(always)]
-    fn copy<const HAS_PLACES: bool>(&mut self, crowd: &Crowd<D>, sources: &[&[f64]]) -> bool {
+    fn copy<const HAS_PLACES: bool>(&mut self, crowd: &Crowd<D>, sources: &Sources) -> bool {
         if self.n_rows == self.rows.len() {
             return false;
         }
-        if self.carried.len() < sources.len() {
-            self.carried.resize(sources.len(), [1.0; ROOM]);
+        if self.carried.len() < sources.of.len() {
+            self.carried.resize(sources.of.len(), [1.0; ROOM]);
         }
         let mut n = 0;
         while self.n_rows < self.rows.len() && n < MOST {
@@ -212,8 +220,9 @@ impl<const D: usize> Near<D> {
                     }
                 }
             }
-            for column in 0..sources.len() {
-                let (source, _) = sources[column][start..start + whole].as_chunks::<PIECE>();
+            for column in 0..sources.of.len() {
+                let from = start - sources.start;
+                let (source, _) = sources.of[column][from..from + whole].as_chunks::<PIECE>();
                 let (target, _) = self.carried[column][n..n + whole].as_chunks_mut::<PIECE>();
                 // A call to copy so few costs more than the loop.
                 #[allow(clippy::manual_memcpy)]

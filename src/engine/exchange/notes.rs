@@ -41,12 +41,28 @@ struct Stock {
 pub struct Sheets {
     stock: Mutex<Stock>,
     most: usize,
+    /// Where more are to be had when all of these are in use.
+    store: Option<Arc<Sheets>>,
+}
+
+impl Drop for Sheets {
+    fn drop(&mut self) {
+        if let Some(store) = self.store.take() {
+            store.take_back(&mut self.stock.get_mut().unwrap_or_else(PoisonError::into_inner).idle);
+        }
+    }
 }
 
 impl Sheets {
     pub fn new(most_bytes: usize) -> Arc<Self> {
         let most = most_bytes / size_of::<Sheet>();
-        Arc::new(Self { stock: Mutex::new(Stock { idle: Vec::new(), n_left: most }), most })
+        Arc::new(Self { stock: Mutex::new(Stock { idle: Vec::new(), n_left: most }), most, store: None })
+    }
+
+    /// A small stock for one thread, which keeps what it has taken from the whole one until it ends: in the cache of one core
+    /// the same sheets serve again and again.
+    pub fn of_thread(store: &Arc<Self>) -> Self {
+        Self { stock: Mutex::default(), most: store.most, store: Some(store.clone()) }
     }
 
     pub fn most(&self) -> usize {
@@ -56,13 +72,16 @@ impl Sheets {
     /// How many can still be taken.
     pub fn n_left(&self) -> usize {
         let stock = self.stock.lock().unwrap_or_else(PoisonError::into_inner);
-        stock.idle.len() + stock.n_left
+        stock.idle.len() + stock.n_left + self.store.as_ref().map_or(0, |store| store.n_left())
     }
 
     fn take(&self) -> Option<Box<Sheet>> {
         let mut stock = self.stock.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(sheet) = stock.idle.pop() {
             return Some(sheet);
+        }
+        if let Some(store) = &self.store {
+            return store.take();
         }
         stock.n_left = stock.n_left.checked_sub(1)?;
         drop(stock);
@@ -81,8 +100,8 @@ pub struct Note {
     /// Pairs in the last sheet.
     n_pairs: usize,
     is_whole: bool,
-    /// Where the last of all candidates stands, and one.
-    pub until: usize,
+    /// Where the first of all candidates stands, and the last, and one.
+    pub span: (usize, usize),
 }
 
 impl Note {
@@ -96,7 +115,7 @@ impl Note {
 
     pub fn forget(&mut self, sheets: &Sheets) {
         self.is_whole = false;
-        self.until = 0;
+        self.span = (usize::MAX, 0);
         if !self.sheets.is_empty() {
             sheets.take_back(&mut self.sheets);
         }
@@ -180,13 +199,11 @@ pub struct Notes {
     pub of: Vec<Note>,
     pub sheets: Arc<Sheets>,
     pub noted: Noted,
-    /// Densities that have just been found.
-    pub fresh: Vec<f64>,
 }
 
 impl Notes {
     pub fn new(sheets: Arc<Sheets>) -> Self {
-        Self { of: Vec::new(), sheets, noted: Noted::Nothing, fresh: Vec::new() }
+        Self { of: Vec::new(), sheets, noted: Noted::Nothing }
     }
 
     /// All of them, and nothing is left.

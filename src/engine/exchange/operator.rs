@@ -8,7 +8,7 @@ use super::super::parallel::{self, Pool};
 use super::around::Around;
 use super::bands::Recalling;
 use super::local::Metrics;
-use super::near::{Crowd, LANES, MOST_TARGETS, Near, PADDING, folded};
+use super::near::{Crowd, LANES, MOST_TARGETS, Near, PADDING, Sources, folded};
 use super::notes::{Noted, Notes};
 use super::own_kernels::OnOwnKernels;
 use super::table::Tabulated;
@@ -97,8 +97,9 @@ pub struct Operator<'a, const D: usize> {
     pub width: Width,
     pub lists: &'a Pool<Near<D>>,
     pub own_lists: &'a Pool<Around>,
-    /// Densities, or the factors of a product; by parcel.
+    /// Densities, or the factors of a product; by parcel, from one on.
     pub factors: Vec<f64>,
+    pub start: usize,
     /// What is known of pairs.
     pub notes: Notes,
     /// What keeps sums of weights below one, by parcel; empty where nothing has to.
@@ -214,16 +215,16 @@ impl<'a, const D: usize> Operator<'a, D> {
 }
 
 /// Some parcels of a pass, to be dispatched to wide or narrow code.
-pub(super) struct OnPortion<'a, 'b, const D: usize, K> {
+pub(super) struct OnPortion<'a, 'b, 'c, const D: usize, K> {
     pub operator: &'a Operator<'b, D>,
     pub kernel: K,
     pub wanted: Wanted<'a>,
     pub first: usize,
-    pub targets: &'a mut [&'b mut [f64]],
+    pub targets: &'a mut [&'c mut [f64]],
     pub near: &'a mut Near<D>,
 }
 
-impl<const D: usize, K: Radial> pulp::NullaryFnOnce for OnPortion<'_, '_, D, K> {
+impl<const D: usize, K: Radial> pulp::NullaryFnOnce for OnPortion<'_, '_, '_, D, K> {
     type Output = ();
 
     #[inline(always)]
@@ -259,7 +260,7 @@ impl<const D: usize, K: Radial> pulp::NullaryFnOnce for OnPortion<'_, '_, D, K> 
     }
 }
 
-impl<const D: usize, K: Radial> OnPortion<'_, '_, D, K> {
+impl<const D: usize, K: Radial> OnPortion<'_, '_, '_, D, K> {
     /// Adds what the candidates at hand give to the sums of a parcel.
     #[inline(always)]
     fn add(&mut self, idx: usize, lanes: &mut [[f64; LANES]]) {
@@ -342,21 +343,24 @@ impl<'a, const D: usize> Operator<'a, D> {
     }
 
     /// What a pass needs of every neighbour.
-    pub(super) fn sources<'s>(&'s self, wanted: Wanted<'s>) -> Vec<&'s [f64]> {
-        match wanted {
+    pub(super) fn sources<'s>(&'s self, wanted: Wanted<'s>) -> Sources<'s> {
+        let start = self.start;
+        let of = match wanted {
             Wanted::Densities => Vec::new(),
             Wanted::Weighted(factors) => vec![factors],
             Wanted::Differences(columns) => {
                 let caps = (!self.caps.is_empty()).then_some(&self.caps);
-                [&self.factors].into_iter().chain(caps).chain(columns).map(|own| &own[..]).collect()
+                let others = caps.into_iter().chain(columns).map(|own| &own[start..]);
+                [&self.factors[..]].into_iter().chain(others).collect()
             }
-        }
+        };
+        Sources { start, of }
     }
 
     /// Forces become weights; the source that comes next.
     #[inline(always)]
     fn normalise(&self, near: &mut Near<D>, idx: usize) -> usize {
-        let own = self.factors[idx];
+        let own = self.factors[idx - self.start];
         match self.normalisation {
             Normalisation::Arithmetic => near.divide_by_mean(0, own),
             Normalisation::Geometric | Normalisation::Sinkhorn => near.multiply(0, own),
@@ -371,7 +375,7 @@ impl<'a, const D: usize> Operator<'a, D> {
     /// The weight of a parcel for itself, with the roundings of [`Self::normalise`].
     #[inline(always)]
     fn own_weight(&self, force: f64, idx: usize) -> f64 {
-        let own = self.factors[idx];
+        let own = self.factors[idx - self.start];
         let weight = force
             * match self.normalisation {
                 Normalisation::Arithmetic => 2.0 / (own + own),

@@ -152,6 +152,7 @@ impl<const D: usize> Space<D> {
         (low, high)
     }
 
+    #[inline(always)]
     pub fn of(&self, x: [f64; D]) -> [f64; D] {
         let mut y = [0.0; D];
         for row in 0..D {
@@ -294,6 +295,11 @@ impl<const D: usize> Space<D> {
             let low = end(axes[axis].low_side, self.low[axis], f64::NEG_INFINITY);
             (low, end(axes[axis].high_side, self.high[axis], f64::INFINITY))
         })
+    }
+
+    /// The part of all rows of cells that are within the radius on one side.
+    pub fn reached_share(&self) -> f64 {
+        (self.radius * self.inverse_edge[0] + 1.0) / self.cells[0] as f64
     }
 
     /// Whether any parcel may be within the radius of a box.
