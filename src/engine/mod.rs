@@ -10,6 +10,7 @@ mod calendar;
 mod clock;
 mod conserved;
 mod control;
+pub mod density;
 mod error;
 mod exchange;
 mod initial;

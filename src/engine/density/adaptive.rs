@@ -1,0 +1,546 @@
+//! Kernels that differ from cell to cell in size and shape, found by iteration.
+//!
+//! Owns the iteration and its end. May use pyramids, curvatures and limits. It deliberately computes bandwidths only where
+//! particles are.
+
+use super::super::parallel;
+use super::classes::{Fill, Table, bandwidth_of, class_of};
+use super::curvature::{Curvatures, curvatures};
+use super::direct;
+use super::ladder::Ladder;
+use super::lattice::{AXES, Field, Lattice, Window};
+use super::limits::{GROWTH, Limits};
+use super::stencil::scatter;
+use super::tally::{Tally, Weighing};
+use super::taps::{Integral, Line, REACH, Taps};
+use crate::maths::vector::{exp, ln, pow};
+use crate::maths::wide::Width;
+use std::f64::consts::PI;
+
+/// Cells that a thread takes at once.
+const PORTION: usize = 64;
+
+/// From this loop on the running mean of the error may end the iteration.
+const RUNNING: usize = 8;
+
+/// Where one direction has more of all roughness than this, the released code takes half of it for isotropic.
+const DOMINANT: f64 = 0.85;
+
+/// Which formulas are taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Variant {
+    /// As published: curvatures without a mean and with the right square, shapes that are least rough.
+    #[default]
+    Corrected,
+    /// As in the released program, with its defects, to compare.
+    Released,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Shape {
+    /// Kernels may be longer along one axis than along another.
+    #[default]
+    Stretched,
+    Round,
+}
+
+/// The bandwidths of the first loop.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Start {
+    /// That of a normal density with the cloud's standard deviations.
+    #[default]
+    NormalReference,
+    /// So much of it.
+    Times(f64),
+    /// m
+    Bandwidth(f64),
+}
+
+/// How kernels are found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Adaptive {
+    pub variant: Variant,
+    pub shape: Shape,
+    pub start: Start,
+    pub weighing: Weighing,
+    /// Bounds of all bandwidths, m.
+    pub bounds: Option<[f64; 2]>,
+    /// Wide kernels are summed on coarse cells.
+    pub is_fast: bool,
+    /// Relative change of a loop that ends the iteration; zero for never.
+    pub tolerance: f64,
+    pub most_loops: usize,
+}
+
+impl Default for Adaptive {
+    fn default() -> Self {
+        Self {
+            variant: Variant::default(),
+            shape: Shape::default(),
+            start: Start::default(),
+            weighing: Weighing::default(),
+            bounds: None,
+            is_fast: true,
+            tolerance: 0.02,
+            most_loops: 20,
+        }
+    }
+}
+
+/// What is known of a cell with particles.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Cell {
+    pub at: [usize; AXES],
+    /// Bandwidth, m: the geometric mean of those along axes.
+    pub h: f64,
+    /// Bandwidths over it.
+    pub s: [f64; AXES],
+    /// Width of the support within which errors are weighed, m.
+    pub sigma: f64,
+    /// Bandwidths of curvatures, m.
+    pub g: [f64; AXES],
+    /// Classes of bandwidths, where they are rounded.
+    pub h_class: [i64; AXES],
+    pub g_class: [i64; AXES],
+    /// Density, and its mean over the support; counts per m^d.
+    pub rho: f64,
+    pub n: f64,
+    /// Net roughness Λ, and locally averaged products of curvatures, by rows of the lower triangle.
+    pub roughness: f64,
+    pub psi: [f64; 6],
+}
+
+/// A density, and how it was found.
+#[derive(Debug, Clone)]
+pub struct Estimate {
+    /// Mass per m^d, by cell of the lattice, and its standard error by the numbers of particles.
+    pub density: Vec<f64>,
+    pub standard_error: Vec<f64>,
+    /// By cell with particles, in the order of the tally.
+    pub cells: Vec<Cell>,
+    /// Mean bandwidth over cells with particles after each loop, m, that of the start first.
+    pub history: Vec<f64>,
+    /// Whether the last loop changed less than the tolerance.
+    pub is_settled: bool,
+}
+
+struct Search<'a> {
+    lattice: &'a Lattice,
+    adaptive: &'a Adaptive,
+    limits: Limits,
+    integral: Integral,
+    width: Width,
+    counts: Vec<f64>,
+    cells: Vec<Cell>,
+    /// The density with their kernels.
+    rho: (Window, Field),
+    d: f64,
+    constants: Constants,
+}
+
+/// Logarithms of what hangs on nothing but the number of axes.
+struct Constants {
+    support: f64,
+    curvature: f64,
+}
+
+impl Constants {
+    fn new(d: f64) -> Self {
+        Self {
+            support: 0.25 * ln((d + 2.0) * pow(8.0 * PI, 0.5 * d) / 4.0),
+            curvature: ln((1.0 + pow(2.0, 0.5 * d + 2.0)) / (3.0 * pow(2.0, 4.0 / (d + 4.0)))) / (d + 6.0)
+                + ln(d + 2.0) / (d + 4.0)
+                - ln(d + 4.0) / (d + 6.0),
+        }
+    }
+}
+
+/// The density of particles that are counted on a lattice.
+pub fn estimate(lattice: &Lattice, tally: &Tally, adaptive: &Adaptive, width: Width) -> Estimate {
+    let (counts, unit) = tally.pseudo_counts(adaptive.weighing);
+    let mut search = Search {
+        lattice,
+        adaptive,
+        limits: Limits::new(lattice, adaptive.bounds),
+        integral: Integral::new(),
+        width,
+        counts,
+        cells: Vec::new(),
+        rho: Default::default(),
+        d: lattice.d as f64,
+        constants: Constants::new(lattice.d as f64),
+    };
+    search.begin(tally);
+    let mut history = vec![search.mean_bandwidth()];
+    let mut ends = Ends::default();
+    let mut is_settled = false;
+    for _ in 0..if search.cells.is_empty() { 0 } else { adaptive.most_loops } {
+        let old = search.cells.clone();
+        search.go_on();
+        history.push(search.mean_bandwidth());
+        is_settled = ends.are_reached(&search, &old);
+        if is_settled {
+            break;
+        }
+    }
+    search.finish(tally, unit, (history, is_settled))
+}
+
+impl Search<'_> {
+    fn begin(&mut self, tally: &Tally) {
+        let (lattice, d) = (self.lattice, self.d);
+        let deviations = tally.deviations();
+        let n: f64 = self.counts.iter().sum();
+        let smallest = lattice.axes().map(|axis| lattice.edge[axis]).fold(f64::INFINITY, f64::min);
+        let mean: f64 = lattice.axes().map(|axis| deviations[axis].max(smallest)).product();
+        let reference = pow(mean, 1.0 / d) * pow(4.0 / ((d + 2.0) * n), 1.0 / (d + 4.0));
+        let h = match self.adaptive.start {
+            Start::NormalReference => reference,
+            Start::Times(factor) => factor * reference,
+            Start::Bandwidth(h) => h,
+        };
+        let cell = |&idx: &u32| {
+            let sigma = (2.0 * h).clamp(self.limits.support[0], self.limits.support[1]);
+            let mut cell = Cell { at: lattice.cell(idx as usize), sigma, ..Cell::default() };
+            self.limit(&mut cell, [h; AXES]);
+            cell
+        };
+        self.cells = tally.cells.iter().map(cell).collect();
+        if !self.cells.is_empty() {
+            self.spread();
+        }
+    }
+
+    fn mean_bandwidth(&self) -> f64 {
+        self.cells.iter().map(|cell| cell.h).sum::<f64>() / self.cells.len().max(1) as f64
+    }
+
+    /// Bandwidths along axes within their bounds, and what follows from them.
+    fn limit(&self, cell: &mut Cell, h: [f64; AXES]) {
+        let mut product = 1.0;
+        let mut own = [1.0; AXES];
+        for axis in self.lattice.axes() {
+            let [low, high] = self.limits.kernel[axis];
+            own[axis] = h[axis].clamp(low, high);
+            if self.adaptive.is_fast {
+                cell.h_class[axis] = class_of(ln(own[axis]));
+                own[axis] = bandwidth_of(cell.h_class[axis]);
+            }
+            product *= own[axis];
+        }
+        cell.h = pow(product, 1.0 / self.d);
+        cell.s = [1.0; AXES];
+        self.lattice.axes().for_each(|axis| cell.s[axis] = own[axis] / cell.h);
+    }
+
+    /// Work on all cells, in portions.
+    fn for_all(&mut self, work: &(dyn Fn(&Self, &mut Cell, &mut [Taps; AXES]) + Sync)) {
+        let mut cells = std::mem::take(&mut self.cells);
+        let mut portions: Vec<&mut [Cell]> = cells.chunks_mut(PORTION).collect();
+        parallel::for_each(&mut portions, &|_, portion| {
+            let mut taps = Default::default();
+            portion.iter_mut().for_each(|cell| work(self, cell, &mut taps));
+        });
+        self.cells = cells;
+    }
+
+    /// One loop.
+    fn go_on(&mut self) {
+        let tools = (self.lattice, self.integral, self.width);
+        let (window, rho) = std::mem::take(&mut self.rho);
+        let (least, most) = self.widths();
+        // They may shrink as they like; what shrinks by more is seen by the next loop.
+        let range = (self.limits.support[0].max(0.5 * least), GROWTH * most);
+        let rho = Smoothed::new(tools, (self.adaptive.is_fast, &window), rho, range);
+        self.for_all(&|search, cell, taps| {
+            let n = rho.at(tools, cell, taps);
+            search.widen(cell, n);
+            cell.n = rho.at(tools, cell, taps);
+            search.choose_curvature(cell);
+        });
+        drop(rho);
+        let settings = (self.adaptive.variant, self.adaptive.is_fast);
+        let Curvatures { window, fields } = curvatures(tools, settings, &self.cells, &self.counts);
+        let range = self.widths();
+        let mut place = 0;
+        for i in 0..fields.len() {
+            for j in 0..=i {
+                let mut product = fields[i].clone();
+                product.values.iter_mut().zip(&fields[j].values).for_each(|(own, other)| *own *= other);
+                let product = Smoothed::new(tools, (self.adaptive.is_fast, &window), product, range);
+                self.for_all(&|_, cell, taps| cell.psi[place] = product.at(tools, cell, taps));
+                place += 1;
+            }
+        }
+        self.for_all(&|search, cell, _| search.choose(cell));
+        self.fill_smooth();
+        self.spread();
+    }
+
+    /// Supports: the narrowest and the widest, m.
+    fn widths(&self) -> (f64, f64) {
+        let sigmas = || self.cells.iter().map(|cell| cell.sigma);
+        (sigmas().fold(f64::INFINITY, f64::min), sigmas().fold(0.0, f64::max))
+    }
+
+    /// Fine cells that kernels reach.
+    fn reach(&self) -> [usize; AXES] {
+        let mut most = [0.0_f64; AXES];
+        for cell in &self.cells {
+            for axis in self.lattice.axes() {
+                most[axis] = most[axis].max(cell.h * cell.s[axis] / self.lattice.edge[axis]);
+            }
+        }
+        most.map(|own| (REACH * own).ceil() as usize + 1)
+    }
+
+    /// `σ = [(d+2)(8π)^{d/2}/4]^{1/4} n^{1/2} h^{1+d/4} ρ^{−1/4}`, within its bounds.
+    fn widen(&self, cell: &mut Cell, n: f64) {
+        let d = self.d;
+        let logs = 0.5 * ln(n) + (1.0 + 0.25 * d) * ln(cell.h) - 0.25 * ln(cell.rho);
+        let [low, high] = self.limits.support;
+        cell.sigma = exp(self.constants.support + logs).min(GROWTH * cell.sigma).clamp(low, high);
+    }
+
+    /// Bandwidths of curvatures.
+    ///
+    /// - Equation: `g_i = α N_v^β h [1/((d+4) s_i⁴) Σ_j a_ij/s_j²]^{−1/(d+6)}`, `N_v = (√(8π) σ)^d n²/ρ`.
+    /// - Symbols: `a_ij` 5 for i = j, else 1; `α` and `β` as in the source.
+    /// - Range: within bounds.
+    /// - Source: methods, (4.3).
+    /// - Shape: one per axis, m.
+    fn choose_curvature(&self, cell: &mut Cell) {
+        let d = self.d;
+        let beta = 2.0 / ((d + 4.0) * (d + 6.0));
+        let virtual_n = d * ln((8.0 * PI).sqrt() * cell.sigma) + 2.0 * ln(cell.n) - ln(cell.rho);
+        let common = self.constants.curvature + beta * virtual_n + ln(cell.h);
+        let [low, high] = self.limits.curvature.map(ln);
+        for axis in self.lattice.axes() {
+            let of_other = |other: usize| {
+                let s = cell.s[other];
+                (if other == axis { 5.0 } else { 1.0 }) / (s * s)
+            };
+            let sum: f64 = self.lattice.axes().map(of_other).sum();
+            let square = cell.s[axis] * cell.s[axis];
+            let log = common - ln(sum / ((d + 4.0) * square * square)) / (d + 6.0);
+            let log = log.clamp(low, high);
+            cell.g_class[axis] = class_of(log);
+            cell.g[axis] = if self.adaptive.is_fast { bandwidth_of(cell.g_class[axis]) } else { exp(log) };
+        }
+    }
+
+    /// Size and shape of a kernel, from roughness: the triangle ψ_ij by rows.
+    fn choose(&self, cell: &mut Cell) {
+        let d = self.lattice.d;
+        let psi = cell.psi;
+        let psi = &psi[..d * (d + 1) / 2];
+        let own: Vec<f64> = (0..d).map(|i| psi[i * (i + 3) / 2]).collect();
+        let is_round = self.adaptive.shape == Shape::Round || own.iter().any(|&psi| psi <= 0.0);
+        let is_released = self.adaptive.variant == Variant::Released;
+        let round = own.iter().sum::<f64>() + 2.0 * crossed(psi, d);
+        let mut roughness = if is_round { round } else { net_roughness(psi, &own, is_released) };
+        let all: f64 = own.iter().sum();
+        if is_released && own.iter().any(|own| own / all > DOMINANT) {
+            roughness = 0.5 * roughness + 0.5 * all;
+        }
+        cell.roughness = roughness.max(0.0);
+        cell.h = if cell.roughness > 0.0 {
+            pow(self.d * cell.n / (pow(4.0 * PI, 0.5 * self.d) * cell.roughness), 1.0 / (self.d + 4.0))
+        } else {
+            0.0
+        };
+        let mean: f64 = own.iter().product();
+        let mut others = 1.0;
+        for axis in self.lattice.axes() {
+            let psi = own[axis + d - AXES];
+            cell.s[axis] = match (is_round || d == 1, is_released) {
+                (true, _) => 1.0,
+                (_, true) if axis + 1 == AXES => 1.0 / others,
+                (_, true) => pow(roughness / psi, 0.25 / self.d),
+                (_, false) => pow(psi, -0.25) * pow(mean, 0.25 / self.d),
+            };
+            others *= cell.s[axis];
+        }
+    }
+
+    /// Where nothing is rough kernels are as wide as the widest, and all are brought within their bounds.
+    fn fill_smooth(&mut self) {
+        let widest = self.cells.iter().fold(0.0_f64, |widest, cell| widest.max(cell.h));
+        let mut cells = std::mem::take(&mut self.cells);
+        for cell in &mut cells {
+            let h = match (cell.h > 0.0, widest > 0.0) {
+                (true, _) => cell.h,
+                (false, true) => widest,
+                (false, false) => self.limits.support[1],
+            };
+            let wanted = cell.s.map(|s| h * s);
+            self.limit(cell, wanted);
+        }
+        self.cells = cells;
+    }
+
+    /// The density with the kernels as they are.
+    fn spread(&mut self) {
+        let window = Window::around(self.lattice, self.cells.iter().map(|cell| cell.at), self.reach());
+        let field = self.density_of(&self.counts, &window, false);
+        for cell in &mut self.cells {
+            let [x, y, z] = cell.at;
+            cell.rho = field.values[field.row(x, y) + z - field.first[2]];
+        }
+        self.rho = (window, field);
+    }
+
+    /// `ρ = Σ_b c_b W_b/V_c` on a window, or `Σ_b c_b W_b²/V_c²`.
+    fn density_of(&self, counts: &[f64], window: &Window, is_squared: bool) -> Field {
+        let lattice = self.lattice;
+        let mut fields = [Field::zeros(window, [1; AXES])];
+        let volume = lattice.volume();
+        let fill: Fill = &|line, own, b, taps| {
+            line.gaussian(self.integral, b, (own, own), taps);
+            if is_squared {
+                taps.values.iter_mut().for_each(|tap| *tap *= *tap);
+            }
+        };
+        let tables: Vec<Option<Table>> = (0..AXES).map(|axis| self.table(axis, fill)).collect();
+        scatter((self.cells.len(), self.width), &mut fields, &|idx, spread| {
+            let cell = &self.cells[idx];
+            spread.weight = counts[idx] / if is_squared { volume * volume } else { volume };
+            for (axis, lent) in spread.taps[0].iter_mut().enumerate() {
+                let line = Line { n: lattice.cells[axis], factor: 1, ends: lattice.ends[axis] };
+                if axis + lattice.d < AXES {
+                    lent.own.be_one();
+                    continue;
+                }
+                let own = cell.h * cell.s[axis] / lattice.edge[axis];
+                match &tables[axis] {
+                    Some(table) => table.lend(line, cell.h_class[axis], cell.at[axis], lent, fill),
+                    None => fill(line, own, cell.at[axis], &mut lent.own),
+                }
+            }
+        });
+        let [field] = fields;
+        field
+    }
+
+    /// Kernels of all classes along an axis, if bandwidths are rounded.
+    fn table(&self, axis: usize, fill: Fill) -> Option<Table> {
+        let classes = || self.cells.iter().map(|cell| cell.h_class[axis]);
+        let range = (classes().min()?, classes().max()?);
+        let is_used = axis + self.lattice.d >= AXES && self.adaptive.is_fast;
+        is_used.then(|| Table::new(range, self.lattice.edge[axis], REACH, fill))
+    }
+
+    fn finish(self, tally: &Tally, unit: f64, (history, is_settled): (Vec<f64>, bool)) -> Estimate {
+        let all = Window { first: [0; AXES], end: self.lattice.cells };
+        let (counts, unit) = match self.adaptive.weighing {
+            Weighing::OfAll | Weighing::Mean => (&self.counts, unit),
+            Weighing::Number | Weighing::OfCell => (&tally.masses, 1.0),
+        };
+        let n = self.lattice.n_cells();
+        let (mut density, mut standard_error) = (vec![0.0; n], vec![0.0; n]);
+        if !self.cells.is_empty() {
+            density = self.density_of(counts, &all, false).values;
+            density.truncate(n);
+            density.iter_mut().for_each(|value| *value *= unit);
+            standard_error = self.density_of(&tally.squares, &all, true).values;
+            standard_error.truncate(n);
+            standard_error.iter_mut().for_each(|value| *value = value.sqrt());
+        }
+        Estimate { density, standard_error, cells: self.cells, history, is_settled }
+    }
+}
+
+fn crossed(psi: &[f64], d: usize) -> f64 {
+    (0..d).flat_map(|i| (0..i).map(move |j| (i, j))).map(|(i, j)| psi[i * (i + 1) / 2 + j]).sum()
+}
+
+/// The net roughness of the shape that is least rough.
+///
+/// - Equation: `ψ` on a line; `2 ψ₁₂ + 2 √(ψ₁₁ψ₂₂)` in a plane; `3 (ψ₁₁ψ₂₂ψ₃₃)^{1/3} + 2 Σ ψ_ij (ψ_kk²/(ψ_iiψ_jj))^{1/6}` in
+///   space.
+/// - Symbols: `ψ_ij` locally averaged products of curvatures; k is the third axis.
+/// - Range: ψ_ii above zero; the released code adds no cross term that is negative in space.
+/// - Source: methods, (3.5), (3.6).
+/// - Shape: never negative, but for rounding.
+fn net_roughness(psi: &[f64], own: &[f64], is_released: bool) -> f64 {
+    match own {
+        [a] => *a,
+        [a, b] => 2.0 * psi[1] + 2.0 * (a * b).sqrt(),
+        [a, b, c] => {
+            let cross = |psi: f64, third: f64, i: f64, j: f64| {
+                let psi = if is_released { psi.max(0.0) } else { psi };
+                2.0 * psi * pow(third * third / (i * j), 1.0 / 6.0)
+            };
+            3.0 * pow(a * b * c, 1.0 / 3.0)
+                + cross(psi[1], *c, *a, *b)
+                + cross(psi[3], *b, *a, *c)
+                + cross(psi[4], *a, *b, *c)
+        }
+        _ => 0.0,
+    }
+}
+
+/// A field that is summed with wide kernels.
+enum Smoothed {
+    Fast(Ladder),
+    Direct(Field),
+}
+
+impl Smoothed {
+    fn new(
+        tools: (&Lattice, Integral, Width),
+        (is_fast, window): (bool, &Window),
+        field: Field,
+        range: (f64, f64),
+    ) -> Self {
+        if is_fast { Self::Fast(Ladder::new(tools, window, field, range)) } else { Self::Direct(field) }
+    }
+
+    /// With the support of a cell.
+    fn at(&self, tools: (&Lattice, Integral, Width), cell: &Cell, taps: &mut [Taps; AXES]) -> f64 {
+        let field = match self {
+            Self::Fast(ladder) if ladder.has(cell.sigma) => return ladder.read(tools.0, cell.at, cell.sigma),
+            Self::Fast(ladder) => &ladder.field,
+            Self::Direct(field) => field,
+        };
+        let mut sum = [0.0];
+        direct::sums(tools, &[field], (cell.at, cell.sigma), taps, &mut sum);
+        sum[0]
+    }
+}
+
+/// What ends the iteration.
+#[derive(Default)]
+struct Ends {
+    errors: Vec<f64>,
+}
+
+impl Ends {
+    /// Whether anything has changed by less than the tolerance: the predicted error, densities, bandwidths, or from some loop
+    /// on the running mean of the error.
+    fn are_reached(&mut self, search: &Search, old: &[Cell]) -> bool {
+        let (cells, d) = (&search.cells, search.d);
+        let n: f64 = search.counts.iter().sum();
+        let error = |cell: &Cell| {
+            let h = cell.h;
+            let variance = cell.n / (pow(4.0 * PI, 0.5 * d) * pow(h, d));
+            (variance + 0.25 * cell.roughness * h * h * h * h) / (n * n)
+        };
+        let root = |squares: f64| (squares / cells.len() as f64).sqrt();
+        let total = root(cells.iter().map(|cell| error(cell) * error(cell)).sum());
+        let change = |new: f64, old: f64| (new / old - 1.0) * (new / old - 1.0);
+        let pairs = || cells.iter().zip(old);
+        let [most, most_old] =
+            [cells, old].map(|all| all.iter().fold(0.0_f64, |most, cell| most.max(cell.rho)));
+        let of_densities = root(pairs().map(|(new, old)| change(new.rho / most, old.rho / most_old)).sum());
+        let of_bandwidths = root(pairs().map(|(new, old)| change(new.h, old.h)).sum());
+        let tolerance = search.adaptive.tolerance;
+        let before = self.errors.last().copied();
+        let mean = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len() as f64;
+        let mean_before = (self.errors.len() + 1 >= RUNNING).then(|| mean(&self.errors));
+        self.errors.push(total);
+        let of_error = before.is_some_and(|before| (total / before - 1.0).abs() < tolerance);
+        let of_mean = mean_before.is_some_and(|before| (mean(&self.errors) / before - 1.0).abs() < tolerance);
+        of_error || of_densities < tolerance || of_bandwidths < tolerance || of_mean
+    }
+}

@@ -1,0 +1,20 @@
+//! Densities of particles by kernels on a lattice: how much there is, how wide kernels have to be for it, and how wrong it is.
+//!
+//! Owns histograms, kernels of one size, and kernels that differ from cell to cell in size and shape. May use the fixed maths
+//! and `parallel`. It deliberately knows no plan: particles come as counts in cells.
+
+mod adaptive;
+mod bands;
+mod classes;
+mod curvature;
+mod direct;
+mod ladder;
+pub mod lattice;
+mod limits;
+mod stencil;
+mod tally;
+mod taps;
+
+pub use adaptive::{Adaptive, Cell, Estimate, Shape, Start, Variant, estimate};
+pub use lattice::{End, Lattice};
+pub use tally::{Tally, Weighing};

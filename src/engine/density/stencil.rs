@@ -1,0 +1,251 @@
+//! Sums over the cells that products of taps reach.
+//!
+//! Owns the two directions: from sources to cells, and from cells to a place. May use taps, fields and `parallel`. It
+//! deliberately adds in the order of sources, whatever the number of threads.
+
+#![allow(clippy::needless_range_loop)] // Zipped iterators are not always inlined; these loops are hot.
+
+use super::super::parallel;
+use super::lattice::{AXES, Field};
+use super::taps::Taps;
+use crate::maths::wide::Width;
+
+/// Sources that are worked on together, and those of a thread at once.
+const TOGETHER: usize = 4096;
+const PORTION: usize = 64;
+
+/// Parts of a field that each of several threads adds to.
+const SLABS: usize = 8;
+
+/// Lanes of a sum.
+const LANES: usize = 4;
+
+/// What sources spread: for each field, along each axis.
+#[derive(Default)]
+pub struct Spread<'t> {
+    pub weight: f64,
+    pub taps: Vec<[Lent<'t>; AXES]>,
+}
+
+/// Taps that are worked out once for many sources, or for one.
+#[derive(Default)]
+pub struct Lent<'t> {
+    pub first: usize,
+    pub shared: Option<&'t [f64]>,
+    pub own: Taps,
+}
+
+impl Lent<'_> {
+    #[inline(always)]
+    fn first(&self) -> usize {
+        if self.shared.is_some() { self.first } else { self.own.first }
+    }
+
+    #[inline(always)]
+    fn values(&self) -> &[f64] {
+        self.shared.unwrap_or(&self.own.values)
+    }
+}
+
+/// Adds what sources spread to fields. `of` fills in what source `idx` does.
+pub fn scatter<'t>(
+    (n, width): (usize, Width),
+    fields: &mut [Field],
+    of: &(dyn Fn(usize, &mut Spread<'t>) + Sync),
+) {
+    let mut spreads: Vec<Spread<'t>> = Vec::new();
+    spreads.resize_with(n.min(TOGETHER), Spread::default);
+    for first in (0..n).step_by(TOGETHER) {
+        let n_own = TOGETHER.min(n - first);
+        let mut portions: Vec<&mut [Spread<'t>]> = spreads[..n_own].chunks_mut(PORTION).collect();
+        parallel::for_each(&mut portions, &|portion, own| {
+            for (at, spread) in own.iter_mut().enumerate() {
+                spread.taps.resize_with(fields.len(), Default::default);
+                of(first + portion * PORTION + at, spread);
+            }
+        });
+        let spreads = &spreads[..n_own];
+        for (idx, field) in fields.iter_mut().enumerate() {
+            let mut slabs = slabs_of(field);
+            parallel::for_each(&mut slabs, &|_, slab| {
+                width.run(Adding { slab, spreads, idx });
+            });
+        }
+    }
+}
+
+/// A part of a field.
+struct Slab<'f> {
+    first: [usize; AXES],
+    end: [usize; AXES],
+    cells: [usize; AXES],
+    values: &'f mut [f64],
+}
+
+/// Cut along the first axis that has more than one cell.
+fn slabs_of(field: &mut Field) -> Vec<Slab<'_>> {
+    let n = field.n();
+    let axis = (0..AXES).find(|&axis| field.cells[axis] > 1).unwrap_or(AXES - 1);
+    let per_cell: usize = field.cells[axis + 1..].iter().product();
+    let n_slabs = match parallel::n_threads() {
+        1 => 1,
+        n_threads => SLABS * n_threads,
+    };
+    let length = field.cells[axis].div_ceil(n_slabs);
+    let (first, cells) = (field.first, field.cells);
+    let cut = |(idx, values)| {
+        let mut slab =
+            Slab { first, end: std::array::from_fn(|axis| first[axis] + cells[axis]), cells, values };
+        slab.first[axis] = first[axis] + idx * length;
+        slab.end[axis] = slab.end[axis].min(slab.first[axis] + length);
+        slab.cells[axis] = slab.end[axis] - slab.first[axis];
+        slab
+    };
+    field.values[..n].chunks_mut(length * per_cell).enumerate().map(cut).collect()
+}
+
+struct Adding<'a, 'f, 't> {
+    slab: &'a mut Slab<'f>,
+    spreads: &'a [Spread<'t>],
+    idx: usize,
+}
+
+impl pulp::NullaryFnOnce for Adding<'_, '_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        for spread in self.spreads {
+            add(self.slab, &spread.taps[self.idx], spread.weight);
+        }
+    }
+}
+
+/// Adds a product of taps to what there is of a slab.
+#[inline(always)]
+fn add(slab: &mut Slab, taps: &[Lent; AXES], weight: f64) {
+    let (mut low, mut high) = ([0; AXES], [0; AXES]);
+    for axis in 0..AXES {
+        low[axis] = taps[axis].first().max(slab.first[axis]);
+        high[axis] = (taps[axis].first() + taps[axis].values().len()).min(slab.end[axis]);
+        if low[axis] >= high[axis] {
+            return;
+        }
+    }
+    let last = &taps[2].values()[low[2] - taps[2].first()..high[2] - taps[2].first()];
+    let part = Part { low, high, weight, last };
+    match last.len().div_ceil(LANES) {
+        1 => part.add::<1>(slab, taps),
+        2 => part.add::<2>(slab, taps),
+        3 => part.add::<3>(slab, taps),
+        4 => part.add::<4>(slab, taps),
+        5 => part.add::<5>(slab, taps),
+        6 => part.add::<6>(slab, taps),
+        7 | 8 => part.add::<8>(slab, taps),
+        9 | 10 => part.add::<10>(slab, taps),
+        11 | 12 => part.add::<12>(slab, taps),
+        _ => part.add::<0>(slab, taps),
+    }
+}
+
+/// The part of a product of taps that lies in a slab.
+struct Part<'a> {
+    low: [usize; AXES],
+    high: [usize; AXES],
+    weight: f64,
+    /// Taps along the last axis.
+    last: &'a [f64],
+}
+
+impl Part<'_> {
+    /// Adds it, a row in so many pieces: with zeros at the end, as whole pieces cost less than what is left of one.
+    #[inline(always)]
+    fn add<const PIECES: usize>(&self, slab: &mut Slab, taps: &[Lent; AXES]) {
+        let Self { low, high, weight, last } = *self;
+        let mut padded = [[0.0; LANES]; PIECES];
+        for (piece, tap) in padded.as_flattened_mut().iter_mut().zip(last) {
+            *piece = *tap;
+        }
+        let of_planes = &taps[0].values()[low[0] - taps[0].first()..high[0] - taps[0].first()];
+        let of_rows = &taps[1].values()[low[1] - taps[1].first()..high[1] - taps[1].first()];
+        for (x, of_plane) in (low[0] - slab.first[0]..).zip(of_planes) {
+            let of_plane = weight * of_plane;
+            let start = (x * slab.cells[1] + low[1] - slab.first[1]) * slab.cells[2] + low[2] - slab.first[2];
+            let rows = slab.values[start..].chunks_mut(slab.cells[2]);
+            for (row, of_row) in rows.zip(of_rows) {
+                let of_row = of_plane * of_row;
+                let (pieces, _) = row.as_chunks_mut::<LANES>();
+                match pieces.first_chunk_mut::<PIECES>() {
+                    Some(pieces) if PIECES > 0 => {
+                        for piece in 0..PIECES {
+                            for lane in 0..LANES {
+                                pieces[piece][lane] += of_row * padded[piece][lane];
+                            }
+                        }
+                    }
+                    _ => {
+                        for (value, tap) in row.iter_mut().zip(last) {
+                            *value += of_row * tap;
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Sums over fields of one window, each with the same product of taps. Along the last axis taps have zeros at the end up to
+/// whole pieces.
+pub struct Gathering<'a> {
+    pub taps: &'a [Taps; AXES],
+    pub fields: &'a [&'a Field],
+    pub sums: &'a mut [f64],
+}
+
+impl pulp::NullaryFnOnce for Gathering<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { taps, fields, sums } = self;
+        let (last, _) = taps[2].values.as_chunks::<LANES>();
+        for (field, sum) in fields.iter().zip(sums) {
+            let mut lanes = [0.0; LANES];
+            for (x, of_plane) in (taps[0].first..).zip(&taps[0].values) {
+                for (y, of_row) in (taps[1].first..).zip(&taps[1].values) {
+                    let weight = of_plane * of_row;
+                    let start = field.row(x, y) + taps[2].first - field.first[2];
+                    let (row, _) = field.values[start..start + last.len() * LANES].as_chunks::<LANES>();
+                    let mut own = [0.0; LANES];
+                    for (values, taps) in row.iter().zip(last) {
+                        for lane in 0..LANES {
+                            own[lane] += values[lane] * taps[lane];
+                        }
+                    }
+                    for lane in 0..LANES {
+                        lanes[lane] += weight * own[lane];
+                    }
+                }
+            }
+            *sum = (lanes[0] + lanes[2]) + (lanes[1] + lanes[3]);
+        }
+    }
+}
+
+impl Taps {
+    /// Zeros up to whole pieces.
+    pub fn pad(&mut self) {
+        let n = self.values.len().next_multiple_of(LANES);
+        self.values.resize(n, 0.0);
+    }
+
+    /// Cuts off what a field does not have: there is nothing.
+    pub fn cut(&mut self, field: &Field, axis: usize) {
+        let (low, high) = (field.first[axis], field.first[axis] + field.cells[axis]);
+        let end = (self.first + self.values.len()).min(high);
+        let skipped = low.saturating_sub(self.first).min(self.values.len());
+        self.values.truncate(end.saturating_sub(self.first));
+        self.values.drain(..skipped.min(self.values.len()));
+        self.first = self.first.max(low);
+    }
+}

@@ -1,0 +1,110 @@
+//! Particles counted in cells.
+//!
+//! Owns counts, masses and what estimators take for counts where masses differ. May use the lattice. It deliberately keeps no
+//! particle.
+
+use super::lattice::{AXES, Lattice};
+
+/// Cells with particles in them.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Tally {
+    /// Numbers of cells, rising.
+    pub cells: Vec<u32>,
+    pub counts: Vec<f64>,
+    pub masses: Vec<f64>,
+    /// Sums of squared masses.
+    pub squares: Vec<f64>,
+    /// Particles outside of the lattice, and their mass.
+    pub outside: (u64, f64),
+    /// Mass-weighted sums of coordinates and of their squares, of what is inside.
+    moments: [[f64; 2]; AXES],
+}
+
+/// What stands for the number of particles in a cell where their masses differ.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Weighing {
+    /// Mass over the effective mass of all, `Σm²/Σm`.
+    #[default]
+    OfAll,
+    /// Mass over the mean mass.
+    Mean,
+    /// The number of particles; masses come in at the end.
+    Number,
+    /// The effective number of particles of the cell, `(Σm)²/Σm²`; masses come in at the end.
+    OfCell,
+}
+
+impl Tally {
+    /// Counts particles with a position per axis of the lattice, from a corner on, and a mass each.
+    pub fn of(lattice: &Lattice, low: &[f64], positions: &[&[f64]], masses: Option<&[f64]>) -> Self {
+        let n = positions.first().map_or(0, |axis| axis.len());
+        let mut of_cells = vec![[0.0; 3]; lattice.n_cells()];
+        let mut tally = Self::default();
+        for idx in 0..n {
+            let mass = masses.map_or(1.0, |masses| masses[idx]);
+            let (mut cell, mut is_inside) = (0, true);
+            for ((axis, x), low) in lattice.axes().zip(positions).zip(low) {
+                let place = (x[idx] - low) / lattice.edge[axis];
+                let n = lattice.cells[axis];
+                // What is on the upper end is inside.
+                is_inside &= place >= 0.0 && place <= n as f64;
+                cell = cell * n + (place.max(0.0) as usize).min(n - 1);
+            }
+            if !is_inside {
+                tally.outside.0 += 1;
+                tally.outside.1 += mass;
+                continue;
+            }
+            for ((axis, x), low) in lattice.axes().zip(positions).zip(low) {
+                let x = x[idx] - low;
+                tally.moments[axis][0] += mass * x;
+                tally.moments[axis][1] += mass * x * x;
+            }
+            let sums = &mut of_cells[cell];
+            sums[0] += 1.0;
+            sums[1] += mass;
+            sums[2] += mass * mass;
+        }
+        for (cell, sums) in of_cells.iter().enumerate().filter(|(_, sums)| sums[0] > 0.0) {
+            tally.cells.push(cell as u32);
+            tally.counts.push(sums[0]);
+            tally.masses.push(sums[1]);
+            tally.squares.push(sums[2]);
+        }
+        tally
+    }
+
+    pub fn mass(&self) -> f64 {
+        self.masses.iter().sum()
+    }
+
+    /// Effective number of particles `(Σm)²/Σm²`.
+    pub fn effective(&self) -> f64 {
+        let square: f64 = self.squares.iter().sum();
+        if square > 0.0 { self.mass() * self.mass() / square } else { 0.0 }
+    }
+
+    /// Standard deviation along each axis, weighted by mass; m.
+    pub fn deviations(&self) -> [f64; AXES] {
+        let mass = self.mass();
+        self.moments.map(|[first, second]| {
+            let mean = first / mass;
+            (second / mass - mean * mean).max(0.0).sqrt()
+        })
+    }
+
+    /// What stands for counts, and what a count of a density means.
+    pub fn pseudo_counts(&self, weighing: Weighing) -> (Vec<f64>, f64) {
+        let (mass, n) = (self.mass(), self.counts.iter().sum::<f64>());
+        let over = |unit: f64| (self.masses.iter().map(|mass| mass / unit).collect(), unit);
+        match weighing {
+            Weighing::OfAll => over(self.squares.iter().sum::<f64>() / mass),
+            Weighing::Mean => over(mass / n),
+            Weighing::Number => (self.counts.clone(), 1.0),
+            Weighing::OfCell => (
+                self.masses.iter().zip(&self.squares).map(|(mass, square)| mass * mass / square).collect(),
+                1.0,
+            ),
+        }
+    }
+}
