@@ -427,7 +427,7 @@ impl Search<'_> {
         let classes = || self.cells.iter().map(|cell| cell.h_class[axis]);
         let range = (classes().min()?, classes().max()?);
         let is_used = axis + self.lattice.d >= AXES && self.adaptive.is_fast;
-        is_used.then(|| Table::new(range, self.lattice.edge[axis], REACH, fill))
+        is_used.then(|| Table::new(range, (self.lattice.cells[axis], self.lattice.edge[axis]), REACH, fill))
     }
 
     fn finish(self, tally: &Tally, unit: f64, (history, is_settled): (Vec<f64>, bool)) -> Estimate {
@@ -444,7 +444,7 @@ impl Search<'_> {
             density.iter_mut().for_each(|value| *value *= unit);
             standard_error = self.density_of(&tally.squares, &all, true).values;
             standard_error.truncate(n);
-            standard_error.iter_mut().for_each(|value| *value = value.sqrt());
+            standard_error.iter_mut().for_each(|value| *value = tally.largest * value.sqrt());
         }
         Estimate { density, standard_error, cells: self.cells, history, is_settled }
     }

@@ -31,17 +31,18 @@ impl Band {
     /// What cells of a level take, none from farther than a reach: `fill` knows it of each cell.
     pub fn of(line: Line, reach: usize, fill: &dyn Fn(Line, usize, &mut Taps)) -> Self {
         let n = line.n.div_ceil(line.factor);
-        let far = Line { n: (2 * reach + 1) * line.factor, ..line };
         let of_cell = |line: Line, cell: usize| {
             let mut taps = Taps::default();
             fill(line, cell, &mut taps);
             taps
         };
-        let Taps { first, values } = of_cell(far, reach);
+        let far = Line { n: (2 * reach + 1) * line.factor, ..line };
+        // Of a short line all cells are near an end.
+        let Taps { first, values } = if reach < n { of_cell(far, reach) } else { Taps::default() };
         let n_ends = (reach + 1).min(n);
         let ends = [0, 1]
             .map(|end| (0..n_ends).map(|k| of_cell(line, if end == 0 { k } else { n - 1 - k })).collect());
-        Self { reach: reach - first, taps: values, ends, n }
+        Self { reach: reach - first.min(reach), taps: values, ends, n }
     }
 
     /// The taps of a cell that is near an end.

@@ -32,11 +32,15 @@ pub struct Table {
 pub type Fill<'f> = &'f (dyn Fn(Line, f64, usize, &mut Taps) + Sync);
 
 impl Table {
-    /// Of all classes between two, on cells of a size, m; kernels end at so many bandwidths.
-    pub fn new((first, last): (i64, i64), edge: f64, reach: f64, fill: Fill) -> Self {
+    /// Of all classes between two, on an axis of so many cells of a size, m; kernels end at so many bandwidths.
+    pub fn new((first, last): (i64, i64), (n, edge): (usize, f64), reach: f64, fill: Fill) -> Self {
         let kernel = |class: i64| {
             let bandwidth = bandwidth_of(class) / edge;
             let reach = (reach * bandwidth).ceil() as usize + 1;
+            // From every cell it reaches an end.
+            if reach > n {
+                return (usize::MAX, Vec::new());
+            }
             let line = Line { n: 2 * reach + 1, factor: 1, ends: Default::default() };
             let mut taps = Taps::default();
             fill(line, bandwidth, reach, &mut taps);
@@ -49,7 +53,7 @@ impl Table {
     pub fn lend<'t>(&'t self, line: Line, class: i64, b: usize, lent: &mut Lent<'t>, fill: Fill) {
         let at = (class - self.first).clamp(0, self.kernels.len() as i64 - 1);
         let (before, values) = &self.kernels[at as usize];
-        if b < *before || b + values.len() > line.n + before {
+        if b < *before || b - before + values.len() > line.n {
             lent.shared = None;
             return fill(line, bandwidth_of(class) / self.edge, b, &mut lent.own);
         }

@@ -118,7 +118,8 @@ impl<'a> Kernels<'a> {
             let classes = || cells().map(|cell| cell.g_class[along]);
             let Some(range) = classes().min().zip(classes().max()) else { continue };
             for axis in lattice.axes() {
-                let table = Table::new(range, lattice.edge[axis], CURVATURE_REACH, &|line, own, b, taps| {
+                let shape = (lattice.cells[axis], lattice.edge[axis]);
+                let table = Table::new(range, shape, CURVATURE_REACH, &|line, own, b, taps| {
                     kernels.work_out((along, axis), (line, own), b, taps);
                 });
                 kernels.tables[along][axis] = Some(table);
@@ -222,7 +223,10 @@ impl Factors {
             n_others += 1;
         }
         let curvature = Curvature::along(own(along));
+        // Of kernels that are wider than an axis is long no sum says anything.
+        let is_short = lattice.axes().any(|axis| own(axis) > 2.0 * lattice.cells[axis] as f64);
         let curvature = match variant {
+            _ if is_short => curvature,
             Variant::Corrected => curvature.corrected(integral, lattice.d, &others[..n_others]),
             Variant::Released => {
                 curvature.scaled((AXES - lattice.d..along).map(|axis| 1.0 / own(axis).sqrt()).product())
@@ -235,6 +239,10 @@ impl Factors {
     fn fill(&self, line: Line, (axis, edge): (usize, f64), b: usize, taps: &mut Taps) {
         let g = self.g / edge;
         let reach = (CURVATURE_REACH * g).ceil() + 0.5;
+        if line.is_short_for(g) {
+            let even = if axis == self.along { 0.0 } else { 1.0 / line.n as f64 };
+            return line.fill_evenly(even, taps);
+        }
         if axis == self.along {
             return line.sample(b, reach, &|z| self.per * self.curvature.at(z), taps);
         }

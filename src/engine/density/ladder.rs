@@ -3,9 +3,9 @@
 //! Owns the widths and what is read between them. May use fields, taps and bands. It deliberately knows not what the fields are.
 
 use super::bands::{Band, smooth};
-use super::lattice::{AXES, Field, Lattice, Window};
+use super::lattice::{AXES, End, Field, Lattice, Window};
 use super::taps::{Integral, Line};
-use crate::maths::vector::ln;
+use crate::maths::vector::{exp, ln};
 use crate::maths::wide::Width;
 use std::f64::consts::SQRT_2;
 
@@ -34,12 +34,12 @@ pub struct Ladder {
 }
 
 /// What a cell reads of a ladder.
-type Cubic = [(usize, [f64; 4]); AXES];
+type Nodes = [(usize, [f64; 3]); AXES];
 
 impl Ladder {
     /// A field on fine cells of a window, smoothed by widths that enclose a range, m.
     ///
-    /// - Equation: `F_σ = Σ_k F_k w_k`, with variances of `σ² − (f² − 1) Δ²/6`.
+    /// - Equation: `F_σ = Σ_k F_k w_k`, with variances of `σ² − (f² − 1) Δ²/6 − f² Δ²/4` where f > 1.
     /// - Symbols: `F_k` means over cells of f fine ones; `w` the Gaussian integrated over them.
     /// - Range: σ at least √2 cells of its level where that is not the finest.
     /// - Source: methods, section 4.8; a mean over cells and a kernel cut to cells widen a kernel by Δ²/12 each.
@@ -84,14 +84,23 @@ impl Ladder {
     }
 
     /// The field at a cell, for a width within the range.
+    ///
+    /// - Equation: `ln F` as a line in `1/σ²` between two rungs.
+    /// - Symbols: `F` smoothed field.
+    /// - Range: of one sign; else F itself is the line.
+    /// - Source: where all is even F hangs on no width, and far from all that there is `ln F` goes as `−r²/2σ²`.
+    /// - Shape: one value.
     pub fn read(&self, lattice: &Lattice, cell: [usize; AXES], deviation: f64) -> f64 {
         let place = 2.0 * ln((deviation / self.narrowest).max(1.0)) / std::f64::consts::LN_2;
         let below = (place as usize).clamp(self.first, self.first + self.rungs.len() - 2) - self.first;
-        let t = (place - (below + self.first) as f64).clamp(0.0, 1.0);
         let [low, high] = [&self.rungs[below], &self.rungs[below + 1]];
-        let at_low = low.cubic(lattice, cell);
-        let at_high = if low.level == high.level { at_low } else { high.cubic(lattice, cell) };
-        (1.0 - t) * read(&low.field, &at_low) + t * read(&high.field, &at_high)
+        let at_low = low.nodes(lattice, cell);
+        let at_high = if low.level == high.level { at_low } else { high.nodes(lattice, cell) };
+        let (narrow, wide) = (read(&low.field, &at_low), read(&high.field, &at_high));
+        let ratio = self.narrowest * power(below + self.first) / deviation;
+        // From 1 at the narrower one to ½ at the wider one.
+        let t = (2.0 * (1.0 - ratio * ratio)).clamp(0.0, 1.0);
+        if narrow * wide > 0.0 { narrow * exp(t * ln(wide / narrow)) } else { (1.0 - t) * narrow + t * wide }
     }
 }
 
@@ -103,57 +112,67 @@ fn power(k: usize) -> f64 {
 /// A Gaussian along an axis of a level.
 fn band(lattice: &Lattice, integral: Integral, (axis, factor): (usize, usize), deviation: f64) -> Band {
     let own = deviation / lattice.edge[axis];
-    let variance = (own * own - ((factor * factor) as f64 - 1.0) / 6.0).max(0.25 * own * own);
+    let square = (factor * factor) as f64;
+    let widened = if factor == 1 { 0.0 } else { (square - 1.0) / 6.0 + 0.25 * square };
+    let variance = (own * own - widened).max(0.25 * own * own);
     let line = Line { n: lattice.cells[axis], factor, ends: lattice.ends[axis] };
     Band::gaussian(line, integral, (variance.sqrt(), own))
 }
 
 impl Rung {
-    /// Cells and weights along each axis with which a fine cell is read: Lagrange's cubic, or a cell itself.
+    /// Cells and weights along each axis with which a fine cell is read: a quadratic B-spline, or a cell itself.
+    ///
+    /// - Equation: `½ (½ − u)²`, `¾ − u²`, `½ (½ + u)²`.
+    /// - Symbols: `u` distance from the centre of the nearest cell, in cells.
+    /// - Range: never negative, so that what is read is not either; widens by a quarter of a cell squared.
+    /// - Source: C. de Boor 1978, A Practical Guide to Splines.
+    /// - Shape: three cells per axis; beyond an end they are those that kernels are mirrored to.
     #[inline(always)]
-    fn cubic(&self, lattice: &Lattice, cell: [usize; AXES]) -> Cubic {
-        let mut cubic = Cubic::default();
+    fn nodes(&self, lattice: &Lattice, cell: [usize; AXES]) -> Nodes {
+        let mut nodes = Nodes::default();
         for axis in 0..AXES {
             let (factor, n, first) = (self.factors[axis], self.field.cells[axis], self.field.first[axis]);
-            if factor == 1 || n < 4 {
-                cubic[axis] = (cell[axis] / factor - first, [1.0, 0.0, 0.0, 0.0]);
+            let own = cell[axis] / factor - first;
+            if factor == 1 {
+                nodes[axis] = (own, [1.0, 0.0, 0.0]);
                 continue;
             }
-            let x = (cell[axis] as f64 + 0.5) / factor as f64 - 0.5 - first as f64;
-            let low = (x - 1.0).clamp(0.0, (n - 4) as f64) as usize;
-            // The last cell of an axis may be narrower: its centre is nearer then.
+            let u = (cell[axis] as f64 + 0.5) / factor as f64 - (own + first) as f64 - 0.5;
+            let spline = [0.5 * (0.5 - u) * (0.5 - u), 0.75 - u * u, 0.5 * (0.5 + u) * (0.5 + u)];
+            let low = own.saturating_sub(1);
+            let mut weights = [0.0; 3];
             let n_all = lattice.cells[axis].div_ceil(factor);
-            let missing = (n_all * factor - lattice.cells[axis]) as f64 / factor as f64;
-            let nearer = if low + 4 + first == n_all { 0.5 * missing } else { 0.0 };
-            cubic[axis] = (low, lagrange(x - low as f64, nearer));
+            for (k, weight) in spline.into_iter().enumerate() {
+                let at = (own + k).checked_sub(1).filter(|&at| at < n);
+                let is_end = [own + first == 0, own + first + 1 == n_all];
+                match at {
+                    Some(at) => weights[at - low] += weight,
+                    // Of windows that end before the domain does nothing is beyond.
+                    None if is_end[usize::from(k == 2)]
+                        && lattice.ends[axis][usize::from(k == 2)] != End::Sink =>
+                    {
+                        weights[own - low] += weight;
+                    }
+                    None => {}
+                }
+            }
+            nodes[axis] = (low, weights);
         }
-        cubic
+        nodes
     }
 }
 
-/// Weights of values at 0, 1, 2 and `3 − nearer` for a value at x.
-fn lagrange(x: f64, nearer: f64) -> [f64; 4] {
-    let last = 3.0 - nearer;
-    let (a, b, c, d) = (x, x - 1.0, x - 2.0, x - last);
-    [
-        b * c * d / (-2.0 * last),
-        a * c * d / (last - 1.0),
-        a * b * d / (2.0 * (2.0 - last)),
-        a * b * c / (last * (last - 1.0) * (last - 2.0)),
-    ]
-}
-
 #[inline(always)]
-fn read(field: &Field, cubic: &Cubic) -> f64 {
+fn read(field: &Field, nodes: &Nodes) -> f64 {
     let mut sum = 0.0;
-    for (x, of_plane) in (cubic[0].0..).zip(cubic[0].1) {
-        for (y, of_row) in (cubic[1].0..).zip(cubic[1].1) {
+    for (x, of_plane) in (nodes[0].0..).zip(nodes[0].1) {
+        for (y, of_row) in (nodes[1].0..).zip(nodes[1].1) {
             let weight = of_plane * of_row;
             if weight == 0.0 {
                 continue;
             }
-            let start = (x * field.cells[1] + y) * field.cells[2] + cubic[2].0;
-            for (value, tap) in field.values[start..start + 4].iter().zip(&cubic[2].1) {
+            let start = (x * field.cells[1] + y) * field.cells[2] + nodes[2].0;
+            for (value, tap) in field.values[start..start + 3].iter().zip(&nodes[2].1) {
                 sum += weight * tap * value;
             }
         }

@@ -12,8 +12,10 @@ pub struct Tally {
     pub cells: Vec<u32>,
     pub counts: Vec<f64>,
     pub masses: Vec<f64>,
-    /// Sums of squared masses.
+    /// Sums of squares of masses over the largest one.
     pub squares: Vec<f64>,
+    /// The largest mass.
+    pub largest: f64,
     /// Particles outside of the lattice, and their mass.
     pub outside: (u64, f64),
     /// Mass-weighted sums of coordinates and of their squares, of what is inside.
@@ -39,7 +41,9 @@ impl Tally {
     pub fn of(lattice: &Lattice, low: &[f64], positions: &[&[f64]], masses: Option<&[f64]>) -> Self {
         let n = positions.first().map_or(0, |axis| axis.len());
         let mut of_cells = vec![[0.0; 3]; lattice.n_cells()];
-        let mut tally = Self::default();
+        let largest =
+            masses.map_or(1.0, |masses| masses.iter().fold(0.0, |largest: f64, &own| largest.max(own)));
+        let mut tally = Self { largest, ..Self::default() };
         for idx in 0..n {
             let mass = masses.map_or(1.0, |masses| masses[idx]);
             let (mut cell, mut is_inside) = (0, true);
@@ -55,17 +59,20 @@ impl Tally {
                 tally.outside.1 += mass;
                 continue;
             }
+            // Squares of the masses themselves might be beyond all numbers.
+            let share = if largest > 0.0 { mass / largest } else { 0.0 };
             for ((axis, x), low) in lattice.axes().zip(positions).zip(low) {
                 let x = x[idx] - low;
-                tally.moments[axis][0] += mass * x;
-                tally.moments[axis][1] += mass * x * x;
+                tally.moments[axis][0] += share * x;
+                tally.moments[axis][1] += share * x * x;
             }
             let sums = &mut of_cells[cell];
             sums[0] += 1.0;
             sums[1] += mass;
-            sums[2] += mass * mass;
+            sums[2] += share * share;
         }
-        for (cell, sums) in of_cells.iter().enumerate().filter(|(_, sums)| sums[0] > 0.0) {
+        // What has no mass has no density.
+        for (cell, sums) in of_cells.iter().enumerate().filter(|(_, sums)| sums[2] > 0.0) {
             tally.cells.push(cell as u32);
             tally.counts.push(sums[0]);
             tally.masses.push(sums[1]);
@@ -80,16 +87,16 @@ impl Tally {
 
     /// Effective number of particles `(Σm)²/Σm²`.
     pub fn effective(&self) -> f64 {
-        let square: f64 = self.squares.iter().sum();
-        if square > 0.0 { self.mass() * self.mass() / square } else { 0.0 }
+        let (square, share) = (self.squares.iter().sum::<f64>(), self.mass() / self.largest);
+        if square > 0.0 { share * share / square } else { 0.0 }
     }
 
     /// Standard deviation along each axis, weighted by mass; m.
     pub fn deviations(&self) -> [f64; AXES] {
-        let mass = self.mass();
+        let share = self.mass() / self.largest;
         self.moments.map(|[first, second]| {
-            let mean = first / mass;
-            (second / mass - mean * mean).max(0.0).sqrt()
+            let mean = first / share;
+            (second / share - mean * mean).max(0.0).sqrt()
         })
     }
 
@@ -98,13 +105,14 @@ impl Tally {
         let (mass, n) = (self.mass(), self.counts.iter().sum::<f64>());
         let over = |unit: f64| (self.masses.iter().map(|mass| mass / unit).collect(), unit);
         match weighing {
-            Weighing::OfAll => over(self.squares.iter().sum::<f64>() / mass),
+            Weighing::OfAll => over(self.squares.iter().sum::<f64>() / (mass / self.largest) * self.largest),
             Weighing::Mean => over(mass / n),
             Weighing::Number => (self.counts.clone(), 1.0),
-            Weighing::OfCell => (
-                self.masses.iter().zip(&self.squares).map(|(mass, square)| mass * mass / square).collect(),
-                1.0,
-            ),
+            Weighing::OfCell => {
+                let share = |mass: &f64| mass / self.largest;
+                let count = |(mass, square): (&f64, &f64)| share(mass) * share(mass) / square;
+                (self.masses.iter().zip(&self.squares).map(count).collect(), 1.0)
+            }
         }
     }
 }

@@ -92,17 +92,27 @@ impl Taps {
 }
 
 impl Line {
-    /// A kernel and what ends make of it: where its centre appears, in fine cells, and by which sign.
+    /// A kernel and what ends make of it: where its centre appears, in fine cells, and by which sign, as far as it reaches the
+    /// line.
     fn images(self, centre: f64, reach: f64) -> impl Iterator<Item = (f64, f64)> {
         let n = self.n as f64;
-        let of_end = |end: End, mirrored: f64, shifted: f64| match end {
-            End::Mirror => (mirrored, 1.0),
-            End::Wrap => (shifted, 1.0),
-            End::Sink => (mirrored, -1.0),
+        let is_ring = self.ends.contains(&End::Wrap);
+        let [low, high]: [f64; 2] = self.ends.map(|end| if end == End::Sink { -1.0 } else { 1.0 });
+        // Once, or twice where the line is shorter than the reach, and so on.
+        let most = ((reach + n) / (2.0 * n)) as i32 + 1;
+        let own = move |k: i32| {
+            let times = k.unsigned_abs() as i32;
+            if is_ring {
+                return [(centre + 2.0 * n * f64::from(k), 1.0), (centre + n * f64::from(2 * k - 1), 1.0)];
+            }
+            let shifted = (centre + 2.0 * n * f64::from(k), (low * high).powi(times));
+            let of_low = if k > 0 { k - 1 } else { 1 - k };
+            let sign = low.powi(of_low) * high.powi(times);
+            [shifted, (2.0 * n * f64::from(k) - centre, sign)]
         };
-        let low = (centre < reach).then(|| of_end(self.ends[0], -centre, centre + n));
-        let high = (n - centre < reach).then(|| of_end(self.ends[1], 2.0 * n - centre, centre - n));
-        std::iter::once((centre, 1.0)).chain(low).chain(high)
+        // The kernel itself comes first, as sums are in this order.
+        let all = std::iter::once(0).chain((1..=most).flat_map(|k| [k, -k])).flat_map(own);
+        all.filter(move |(image, _)| image + reach > 0.0 && image - reach < n)
     }
 
     /// Cells of the level that are within reach of a centre.
@@ -114,14 +124,26 @@ impl Line {
         (first / self.factor, end / self.factor + 1)
     }
 
+    /// Whether a kernel and its images are the same everywhere, to 3e-9: it is wider than twice the line, and nothing is lost.
+    pub fn is_short_for(self, width: f64) -> bool {
+        width > 2.0 * self.n as f64 && !self.ends.contains(&End::Sink)
+    }
+
+    /// The same in every fine cell.
+    pub fn fill_evenly(self, value: f64, taps: &mut Taps) {
+        taps.first = 0;
+        taps.values.clear();
+        for cell in 0..self.n.div_ceil(self.factor) {
+            taps.values.push(value * self.factor.min(self.n - cell * self.factor) as f64);
+        }
+    }
+
     /// Room for all images.
     fn clear(self, centre: f64, reach: f64, taps: &mut Taps) {
         let (mut first, mut end) = self.within(centre, reach);
         for (image, _) in self.images(centre, reach).skip(1) {
-            if image + reach > 0.0 && image - reach < self.n as f64 {
-                let own = self.within(image, reach);
-                (first, end) = (first.min(own.0), end.max(own.1));
-            }
+            let own = self.within(image, reach);
+            (first, end) = (first.min(own.0), end.max(own.1));
         }
         taps.first = first;
         taps.values.clear();
@@ -146,14 +168,14 @@ impl Line {
     }
 
     fn gaussian_at(self, integral: Integral, centre: f64, (deviation, width): (f64, f64), taps: &mut Taps) {
+        if self.is_short_for(width) {
+            return self.fill_evenly(1.0 / self.n as f64, taps);
+        }
         let reach = (REACH * width).ceil() + 0.5;
         self.clear(centre, reach, taps);
         let per = 1.0 / deviation;
         let norm = 0.5 / integral.at(reach * per);
         for (centre, sign) in self.images(centre, reach) {
-            if centre + reach <= 0.0 || centre - reach >= self.n as f64 {
-                continue;
-            }
             let (first, end) = self.within(centre, reach);
             let start = ((first * self.factor) as f64).max(centre - reach);
             let mut below = integral.at((start - centre) * per);
@@ -171,9 +193,6 @@ impl Line {
         let centre = b as f64 + 0.5;
         self.clear(centre, reach, taps);
         for (centre, sign) in self.images(centre, reach) {
-            if centre + reach <= 0.0 || centre - reach >= self.n as f64 {
-                continue;
-            }
             let (first, end) = self.within(centre, reach);
             for cell in first..end {
                 let (low, high) = (cell * self.factor, ((cell + 1) * self.factor).min(self.n));
