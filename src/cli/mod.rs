@@ -6,6 +6,7 @@
 mod check;
 mod completions;
 mod data;
+mod density;
 mod error_bars;
 mod explain;
 mod facts;
@@ -88,6 +89,7 @@ enum Command {
     Status(sweep_folder::StatusArguments),
     Report(report::Arguments),
     Stress(stress::Arguments),
+    Density(density::Arguments),
     Why(why::Arguments),
     Verify(verify::Arguments),
     Repro(verify::ReproArguments),
@@ -133,6 +135,7 @@ pub(crate) fn main() -> ExitCode {
         Command::Gather(gather) => sweep_folder::gather(gather, &terminal),
         Command::Status(status) => sweep_folder::status(status, &terminal),
         Command::Stress(stress) => stress::run(stress, &terminal),
+        Command::Density(density) => density::run(density, &terminal),
         Command::Report(report) => report::run(report, &terminal),
         Command::Why(why) => why::run(why, &terminal),
         Command::Verify(verify) => verify::run(verify, &terminal),

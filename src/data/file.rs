@@ -36,6 +36,15 @@ impl DataFile {
         Self { name: name.into(), bytes, hash, known: Mutex::default() }
     }
 
+    /// What a table of ours says that its columns are in, by their names.
+    pub fn units(&self) -> BTreeMap<String, String> {
+        if self.bytes.starts_with(super::parquet::MAGIC) {
+            super::parquet::units(&self.bytes)
+        } else {
+            BTreeMap::new()
+        }
+    }
+
     /// The declared columns.
     pub fn columns(&self, wanted: &[Column]) -> Result<Arc<Columns>, ReadError> {
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);

@@ -6,6 +6,7 @@
 
 mod bins;
 mod cells;
+mod density;
 mod failure;
 mod footer;
 mod gather;
@@ -22,6 +23,7 @@ mod unit;
 mod writer;
 
 pub use bins::{Grid, centre};
+pub use density::{DensityCell, DensityTable, write_density};
 pub use failure::TableError;
 pub use footer::{Footer, KEY as FOOTER_KEY, Parameter as FooterParameter, VERSION as FOOTER_VERSION};
 pub use gather::Gatherer;

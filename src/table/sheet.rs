@@ -101,7 +101,15 @@ impl Sheet {
     /// The footer goes into the file's metadata, where most tools look, and into the Arrow schema,
     /// where pyarrow and pandas look.
     pub fn create(target: &Path, schema: SchemaRef, footer: &Footer) -> Result<Self, TableError> {
-        let pairs = footer.key_values();
+        Self::with_notes(target, schema, footer.key_values())
+    }
+
+    /// A table that comes from no scene: notes are by their keys.
+    pub fn with_notes(
+        target: &Path,
+        schema: SchemaRef,
+        pairs: Vec<(String, String)>,
+    ) -> Result<Self, TableError> {
         let schema =
             schema.as_ref().clone().with_metadata(pairs.iter().cloned().collect::<arrow_schema::Metadata>());
         let (draft, file) = Draft::new(target)?;

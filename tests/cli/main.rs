@@ -2,6 +2,7 @@
 
 mod basics;
 mod cache;
+mod density;
 mod error_bars;
 mod files;
 mod flow_table;

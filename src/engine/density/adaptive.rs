@@ -6,10 +6,10 @@
 use super::super::parallel;
 use super::classes::{Fill, Table, bandwidth_of, class_of};
 use super::curvature::{Curvatures, curvatures};
-use super::direct;
-use super::ladder::Ladder;
 use super::lattice::{AXES, Field, Lattice, Window};
 use super::limits::{GROWTH, Limits};
+use super::rough::{crossed, net_roughness};
+use super::smoothed::Smoothed;
 use super::stencil::scatter;
 use super::tally::{Tally, Weighing};
 use super::taps::{Integral, Line, REACH, Taps};
@@ -447,65 +447,6 @@ impl Search<'_> {
             standard_error.iter_mut().for_each(|value| *value = tally.largest * value.sqrt());
         }
         Estimate { density, standard_error, cells: self.cells, history, is_settled }
-    }
-}
-
-fn crossed(psi: &[f64], d: usize) -> f64 {
-    (0..d).flat_map(|i| (0..i).map(move |j| (i, j))).map(|(i, j)| psi[i * (i + 1) / 2 + j]).sum()
-}
-
-/// The net roughness of the shape that is least rough.
-///
-/// - Equation: `ψ` on a line; `2 ψ₁₂ + 2 √(ψ₁₁ψ₂₂)` in a plane; `3 (ψ₁₁ψ₂₂ψ₃₃)^{1/3} + 2 Σ ψ_ij (ψ_kk²/(ψ_iiψ_jj))^{1/6}` in
-///   space.
-/// - Symbols: `ψ_ij` locally averaged products of curvatures; k is the third axis.
-/// - Range: ψ_ii above zero; the released code adds no cross term that is negative in space.
-/// - Source: methods, (3.5), (3.6).
-/// - Shape: never negative, but for rounding.
-fn net_roughness(psi: &[f64], own: &[f64], is_released: bool) -> f64 {
-    match own {
-        [a] => *a,
-        [a, b] => 2.0 * psi[1] + 2.0 * (a * b).sqrt(),
-        [a, b, c] => {
-            let cross = |psi: f64, third: f64, i: f64, j: f64| {
-                let psi = if is_released { psi.max(0.0) } else { psi };
-                2.0 * psi * pow(third * third / (i * j), 1.0 / 6.0)
-            };
-            3.0 * pow(a * b * c, 1.0 / 3.0)
-                + cross(psi[1], *c, *a, *b)
-                + cross(psi[3], *b, *a, *c)
-                + cross(psi[4], *a, *b, *c)
-        }
-        _ => 0.0,
-    }
-}
-
-/// A field that is summed with wide kernels.
-enum Smoothed {
-    Fast(Ladder),
-    Direct(Field),
-}
-
-impl Smoothed {
-    fn new(
-        tools: (&Lattice, Integral, Width),
-        (is_fast, window): (bool, &Window),
-        field: Field,
-        range: (f64, f64),
-    ) -> Self {
-        if is_fast { Self::Fast(Ladder::new(tools, window, field, range)) } else { Self::Direct(field) }
-    }
-
-    /// With the support of a cell.
-    fn at(&self, tools: (&Lattice, Integral, Width), cell: &Cell, taps: &mut [Taps; AXES]) -> f64 {
-        let field = match self {
-            Self::Fast(ladder) if ladder.has(cell.sigma) => return ladder.read(tools.0, cell.at, cell.sigma),
-            Self::Fast(ladder) => &ladder.field,
-            Self::Direct(field) => field,
-        };
-        let mut sum = [0.0];
-        direct::sums(tools, &[field], (cell.at, cell.sigma), taps, &mut sum);
-        sum[0]
     }
 }
 

@@ -11,6 +11,8 @@ mod direct;
 mod ladder;
 pub mod lattice;
 mod limits;
+mod rough;
+mod smoothed;
 mod stencil;
 mod tally;
 mod taps;

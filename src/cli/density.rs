@@ -1,0 +1,383 @@
+//! `lamella density`: from points of any table to a density on cells.
+
+use super::files::read_data;
+use super::text::{duration, significant};
+use super::{CommandResult, Exit, Stopped, Terminal};
+use clap::ValueEnum;
+use lamella::data::{Column, DataFile, Place, ReadError};
+use lamella::diagnostic::{Diagnostic, codes};
+use lamella::engine::density::{
+    Adaptive, End, Estimate, Lattice, Shape, Start, Tally, Variant, Weighing, estimate,
+};
+use lamella::maths::wide::Width;
+use lamella::table::{DensityCell, DensityTable, write_density};
+use lamella::units::Unit;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Cells, at most: density, error and four more numbers of each are in memory.
+const MOST_CELLS: usize = 100_000_000;
+
+/// Estimate a density from points of a table, with kernels of locally best size and shape
+///
+/// Points come from a CSV or Parquet file with a column per axis, and perhaps one of weights. Every kernel is put on the cells
+/// of a lattice and keeps its mass; its size and shape follow from the density around it, found by iteration.
+#[derive(clap::Args)]
+pub(crate) struct Arguments {
+    /// CSV or Parquet file
+    file: PathBuf,
+    /// Where the cells are, per axis, such as "0..200 m, 0..80 m"
+    #[arg(long, value_name = "LOW..HIGH,…", value_parser = Axis::parse, value_delimiter = ',', required = true, allow_hyphen_values = true)]
+    domain: Vec<Axis>,
+    /// How many cells along each axis
+    #[arg(long, value_name = "N,…", value_delimiter = ',', required = true)]
+    cells: Vec<usize>,
+    /// Columns of coordinates, one per axis [default: x, y, z as many as needed]
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
+    columns: Vec<String>,
+    /// Column of weights, such as masses [default: all points weigh 1]
+    #[arg(long, value_name = "NAME")]
+    weight: Option<String>,
+    /// What both ends of each axis are: one word for all, or one per axis
+    #[arg(long, value_name = "WORD,…", value_enum, value_delimiter = ',', default_value = "reflect")]
+    ends: Vec<EndName>,
+    /// Kernels of one size along all axes
+    #[arg(long)]
+    round: bool,
+    /// Least and largest bandwidth, in the unit of the domain
+    #[arg(long, value_name = "LOW..HIGH", value_parser = Axis::parse)]
+    bandwidth: Option<Axis>,
+    /// What counts where weights differ
+    #[arg(long, value_enum, default_value_t = WeighingName::All)]
+    weighing: WeighingName,
+    /// Relative change of a loop that ends the iteration
+    #[arg(long, value_name = "X", default_value_t = 0.02)]
+    tolerance: f64,
+    /// Loops, at most
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u64).range(0..=1000))]
+    loops: u64,
+    /// Every kernel in full, without coarse cells and rounded bandwidths: slower, the same within the error
+    #[arg(long)]
+    exact: bool,
+    /// The formulas of the released GPKDE program with its defects, to compare; implies --exact
+    #[arg(long)]
+    parity: bool,
+    /// Write only cells that have a density
+    #[arg(long)]
+    nonzero: bool,
+    /// Threads [default: all cores]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=4096))]
+    threads: Option<u64>,
+    /// Parquet file to write
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum EndName {
+    /// Nothing passes
+    Reflect,
+    /// Both ends are one
+    Periodic,
+    /// Nothing stays: the density is zero
+    Absorb,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum WeighingName {
+    /// Weights over the effective weight of all points
+    All,
+    /// Weights over their mean
+    Mean,
+    /// Points
+    Number,
+    /// The effective number of points of each cell: for few points of very different weights
+    Cell,
+}
+
+/// A range, and perhaps its unit.
+#[derive(Debug, Clone)]
+struct Axis {
+    low: f64,
+    high: f64,
+    unit: Option<(String, Unit)>,
+}
+
+impl Axis {
+    fn parse(text: &str) -> Result<Self, String> {
+        let wrong = || format!("`{}` is no range such as 0..200 m", text.trim());
+        let (low, rest) = text.trim().split_once("..").ok_or_else(wrong)?;
+        let rest = rest.trim();
+        // An exponent is no unit.
+        let is_of_number = |(at, c): (usize, char)| {
+            c.is_ascii_digit()
+                || ".+-".contains(c)
+                || (at > 0 && "eE".contains(c) && !rest[at + 1..].starts_with(' '))
+        };
+        let end = rest.char_indices().find(|&at| !is_of_number(at)).map_or(rest.len(), |(at, _)| at);
+        let (high, unit) = (&rest[..end], rest[end..].trim());
+        let number = |text: &str| text.trim().parse::<f64>().ok().filter(|number| number.is_finite());
+        let (low, high) = number(low).zip(number(high)).ok_or_else(wrong)?;
+        if low >= high {
+            return Err(format!("`{}` is empty: its end is not above its beginning", text.trim()));
+        }
+        if unit.is_empty() {
+            return Ok(Self { low, high, unit: None });
+        }
+        let known = Unit::parse(unit).map_err(|_| format!("`{unit}` is no unit"))?;
+        Ok(Self { low, high, unit: Some((unit.to_owned(), known)) })
+    }
+}
+
+pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
+    let start = Instant::now();
+    let points = read(arguments)?;
+    let lattice = lattice(arguments, &points)?;
+    let low: Vec<f64> =
+        arguments.domain.iter().zip(&points.factors).map(|(axis, factor)| axis.low * factor).collect();
+    let (coordinates, weights) = points.numbers.split_at(arguments.domain.len());
+    let coordinates: Vec<&[f64]> = coordinates.iter().map(|own| &own[..]).collect();
+    let tally = Tally::of(&lattice, &low, &coordinates, weights.first().map(|own| &own[..]));
+    if tally.cells.is_empty() {
+        let message = Diagnostic::error(codes::F101, "no point with a weight lies within the domain");
+        let help = format!("{} points are outside: look at --domain, --columns and units", tally.outside.0);
+        return Err(Stopped::new(Exit::SceneWrong, message.help(help)));
+    }
+    let adaptive = adaptive(arguments, points.factors[0]);
+    let estimated = Instant::now();
+    let work = || estimate(&lattice, &tally, &adaptive, Width::widest());
+    let mut found = match arguments.threads {
+        None => work(),
+        Some(n) => rayon::ThreadPoolBuilder::new()
+            .num_threads(n as usize)
+            .build()
+            .map_err(|error| failed(&format!("cannot start {n} threads: {error}")))?
+            .install(work),
+    };
+    let seconds = estimated.elapsed().as_secs_f64();
+    let error = norm(&found.standard_error) / norm(&found.density);
+    let table = tabulate(arguments, &points, (&lattice, &low), (&tally, &mut found));
+    let path = write_density(&arguments.out, &table)
+        .map_err(|error| Stopped::new(Exit::Failed, Diagnostic::error(codes::F103, error.to_string())))?;
+    tell(terminal, &path, (&lattice, &tally, &found), (seconds, start.elapsed().as_secs_f64(), error))?;
+    Ok(Exit::Done)
+}
+
+/// Numbers in SI where units are known, the weights last; the factors of coordinates and the units of all.
+struct Points {
+    hash: String,
+    names: Vec<String>,
+    factors: Vec<f64>,
+    units: Vec<String>,
+    numbers: Vec<Vec<f64>>,
+}
+
+fn read(arguments: &Arguments) -> Result<Points, Stopped> {
+    let d = arguments.domain.len();
+    let names: Vec<String> = match arguments.columns.len() {
+        0 => ["x", "y", "z"].into_iter().take(d).map(str::to_owned).collect(),
+        _ => arguments.columns.clone(),
+    };
+    if d > 3 || names.len() != d {
+        return Err(wrong("a domain has one to three axes, and as many columns"));
+    }
+    let bytes = read_data(&arguments.file)?;
+    let file = DataFile::new(arguments.file.display().to_string(), bytes);
+    let noted = file.units();
+    let unit_of = |name: &String, given: Option<&(String, Unit)>| -> (String, Unit) {
+        let noted = || noted.get(name).and_then(|text| Some((text.clone(), Unit::parse(text).ok()?)));
+        given.cloned().or_else(noted).unwrap_or((String::new(), Unit::ONE))
+    };
+    let mut units: Vec<(String, Unit)> =
+        names.iter().zip(&arguments.domain).map(|(name, axis)| unit_of(name, axis.unit.as_ref())).collect();
+    let mut wanted = names;
+    if let Some(weight) = &arguments.weight {
+        units.push(unit_of(weight, None));
+        wanted.push(weight.clone());
+    }
+    let columns: Vec<Column> = wanted
+        .iter()
+        .zip(&units)
+        .map(|(name, (_, unit))| Column { name: name.clone(), unit: *unit })
+        .collect();
+    let found = file.columns(&columns).map_err(|error| unreadable(&arguments.file, &error))?;
+    if let Some(row) = found.numbers.get(d).and_then(|own| own.iter().position(|weight| *weight < 0.0)) {
+        let error =
+            ReadError::new(lamella::data::Kind::Value, "a weight is below zero").at(found.places.of(row));
+        return Err(unreadable(&arguments.file, &error));
+    }
+    Ok(Points {
+        hash: file.hash.clone(),
+        factors: units[..d].iter().map(|(_, unit)| unit.factor()).collect(),
+        units: units.iter().map(|(text, unit)| si(text, unit)).collect(),
+        names: wanted,
+        numbers: found.numbers.clone(),
+    })
+}
+
+/// The name of what numbers are in.
+fn si(text: &str, unit: &Unit) -> String {
+    if text.is_empty() || text == "1" { String::new() } else { lamella::table::si_text(unit.dimension) }
+}
+
+fn lattice(arguments: &Arguments, points: &Points) -> Result<Lattice, Stopped> {
+    let d = arguments.domain.len();
+    if arguments.cells.len() != d {
+        return Err(wrong(&format!("--cells has {} numbers for {d} axes", arguments.cells.len())));
+    }
+    let n = arguments.cells.iter().try_fold(1_usize, |n, &own| n.checked_mul(own));
+    if n.is_none_or(|n| n == 0 || n > MOST_CELLS) {
+        return Err(wrong("there may be 1 to 100 million cells"));
+    }
+    if arguments.ends.len() != 1 && arguments.ends.len() != d {
+        return Err(wrong(&format!("--ends has {} words for {d} axes", arguments.ends.len())));
+    }
+    let axis = |idx: usize| {
+        let (Axis { low, high, .. }, factor) = (&arguments.domain[idx], points.factors[idx]);
+        let end = match arguments.ends.get(idx).unwrap_or(&arguments.ends[0]) {
+            EndName::Reflect => End::Mirror,
+            EndName::Periodic => End::Wrap,
+            EndName::Absorb => End::Sink,
+        };
+        (arguments.cells[idx], (high - low) * factor / arguments.cells[idx] as f64, [end; 2])
+    };
+    let axes: Vec<(usize, f64, [End; 2])> = (0..d).map(axis).collect();
+    Lattice::new(&axes).ok_or_else(|| wrong("cells of this domain have no size that is a number"))
+}
+
+fn adaptive(arguments: &Arguments, factor: f64) -> Adaptive {
+    Adaptive {
+        variant: if arguments.parity { Variant::Released } else { Variant::Corrected },
+        shape: if arguments.round { Shape::Round } else { Shape::Stretched },
+        start: Start::NormalReference,
+        weighing: match arguments.weighing {
+            WeighingName::All => Weighing::OfAll,
+            WeighingName::Mean => Weighing::Mean,
+            WeighingName::Number => Weighing::Number,
+            WeighingName::Cell => Weighing::OfCell,
+        },
+        bounds: arguments.bandwidth.as_ref().map(|own| [own.low * factor, own.high * factor]),
+        is_fast: !(arguments.exact || arguments.parity),
+        tolerance: arguments.tolerance,
+        most_loops: arguments.loops as usize,
+    }
+}
+
+fn tabulate(
+    arguments: &Arguments,
+    points: &Points,
+    (lattice, low): (&Lattice, &[f64]),
+    (tally, found): (&Tally, &mut Estimate),
+) -> DensityTable {
+    let axes = lattice.axes().enumerate().map(|(idx, axis)| {
+        let (name, unit) = (points.names[idx].clone(), points.units[idx].clone());
+        (name, unit, low[idx], lattice.edge[axis], lattice.cells[axis])
+    });
+    let cells =
+        found.cells.iter().zip(&tally.cells).zip(&tally.counts).map(|((cell, &idx), &count)| DensityCell {
+            idx: idx as usize,
+            n_particles: count as u64,
+            bandwidth: lattice.axes().map(|axis| cell.h * cell.s[axis]).collect(),
+            support: cell.sigma,
+            roughness: cell.roughness,
+        });
+    let notes = serde_json::json!({
+        "version": 1,
+        "lamella": env!("CARGO_PKG_VERSION"),
+        "file": { "name": arguments.file.file_name().map(|name| name.to_string_lossy().into_owned()), "hash": points.hash },
+        "columns": points.names,
+        "exact": arguments.exact || arguments.parity,
+        "parity": arguments.parity,
+        "round": arguments.round,
+        "tolerance": arguments.tolerance,
+        "loops": found.history.len() - 1,
+        "settled": found.is_settled,
+        "mean_bandwidth_by_loop": found.history,
+        "weight_inside": tally.mass(),
+        "effective_points": tally.effective(),
+        "points_outside": tally.outside.0,
+        "weight_outside": tally.outside.1,
+    });
+    DensityTable {
+        axes: axes.collect(),
+        unit: points.units.get(low.len()).cloned().unwrap_or_default(),
+        density: std::mem::take(&mut found.density),
+        standard_error: std::mem::take(&mut found.standard_error),
+        is_sparse: arguments.nonzero,
+        cells: cells.collect(),
+        notes: notes.to_string(),
+    }
+}
+
+fn tell(
+    terminal: &Terminal,
+    path: &Path,
+    (lattice, tally, found): (&Lattice, &Tally, &Estimate),
+    (seconds, all, error): (f64, f64, f64),
+) -> Result<(), Stopped> {
+    let n: f64 = tally.counts.iter().sum();
+    let (loops, mean) = (found.history.len() - 1, found.history.last().copied().unwrap_or(0.0));
+    if terminal.is_json() {
+        let text = serde_json::json!({
+            "file": path.display().to_string(), "points": n, "points_outside": tally.outside.0,
+            "cells": lattice.n_cells(), "cells_with_points": tally.cells.len(), "loops": loops,
+            "settled": found.is_settled, "mean_bandwidth": mean, "relative_standard_error": error,
+            "seconds_estimate": seconds, "seconds": all,
+        });
+        return terminal.product(&format!("{text}\n"));
+    }
+    if terminal.is_quiet() {
+        return Ok(());
+    }
+    let outside = match tally.outside.0 {
+        0 => String::new(),
+        n => format!("; {n} outside of the domain are left out"),
+    };
+    let state =
+        if found.is_settled { "settled" } else { "not settled: more --loops, or a larger --tolerance" };
+    terminal.product(&format!(
+        "points:     {n} in {} of {} cells{outside}\nkernels:    {loops} loops, {state}; mean bandwidth {}\nerror:      \
+         {} % by the number of points (L2 of the standard error over the density)\ntime:       {} for the density, {} in all\n\
+         density:    {}\n",
+        tally.cells.len(),
+        lattice.n_cells(),
+        significant(mean, 3),
+        significant(100.0 * error, 2),
+        duration(seconds),
+        duration(all),
+        path.display(),
+    ))
+}
+
+fn norm(values: &[f64]) -> f64 {
+    values.iter().map(|value| value * value).sum::<f64>().sqrt()
+}
+
+fn wrong(message: &str) -> Stopped {
+    Stopped::new(
+        Exit::SceneWrong,
+        Diagnostic::error(codes::F101, message.to_owned()).help("see lamella density --help"),
+    )
+}
+
+fn failed(message: &str) -> Stopped {
+    Stopped::new(Exit::Failed, Diagnostic::error(codes::F103, message.to_owned()))
+}
+
+fn unreadable(file: &Path, error: &ReadError) -> Stopped {
+    let place = match error.place {
+        None => String::new(),
+        Some(Place::Byte(at)) => format!(" (byte {at})"),
+        Some(Place::Text { line, column }) => format!(" (line {line}, column {column})"),
+        Some(Place::Row(row)) => format!(" (row {row})"),
+    };
+    let message = format!("cannot take points from {}: {}{place}", file.display(), error.message);
+    let message = Diagnostic::error(codes::F101, message);
+    Stopped::new(
+        Exit::SceneWrong,
+        match &error.help {
+            Some(help) => message.help(help.clone()),
+            None => message,
+        },
+    )
+}

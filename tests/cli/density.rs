@@ -1,0 +1,112 @@
+//! `lamella density`: points of any table become a density, or one clear sentence.
+
+use crate::program::Folder;
+use lamella::data::{Column, DataFile};
+use lamella::units::Unit;
+
+/// Points of a normal density: quantiles along x, spread evenly by the golden mean along y.
+fn points(n: usize) -> String {
+    let mut text = "x,y,m,name\n".to_owned();
+    for i in 0..n {
+        let p = (i as f64 + 0.5) / n as f64;
+        // The logistic distribution has a closed quantile.
+        let quantile = |p: f64| lamella::maths::scalar::ln(p / (1.0 - p));
+        let y = (i as f64 * 0.618_033_988_749_894_9).fract();
+        text +=
+            &format!("{},{},{},a\n", 50.0 + 4.0 * quantile(p), 20.0 + 2.0 * quantile(y.max(1e-9)), 0.5 + p);
+    }
+    text
+}
+
+fn columns(path: &std::path::Path, wanted: &[&str]) -> Vec<Vec<f64>> {
+    let file = DataFile::new("density", std::fs::read(path).expect("the table"));
+    let column = |name: &&str| Column { name: (*name).to_owned(), unit: Unit::ONE };
+    let wanted: Vec<Column> = wanted.iter().map(column).collect();
+    file.columns(&wanted).expect("columns of numbers").numbers.clone()
+}
+
+const DOMAIN: [&str; 4] = ["--domain", "0..100, 0..40", "--cells", "200,80"];
+
+#[test]
+fn points_of_a_text_file_become_a_density() {
+    let folder = Folder::new();
+    folder.write("points.csv", points(4000));
+    let mut arguments = vec!["density", "points.csv", "--out", "density.parquet", "--weight", "m"];
+    arguments.extend(DOMAIN);
+    folder.lamella(&arguments).exits(0).gives("loops, settled").gives("density.parquet");
+    let found =
+        columns(&folder.path("density.parquet"), &["x", "y", "density", "standard_error", "n_particles"]);
+    assert_eq!(found[0].len(), 200 * 80);
+    assert_eq!((found[0][0], found[1][0], found[1][1]), (0.25, 0.25, 0.75));
+    let mass: f64 = found[2].iter().sum::<f64>() * 0.25;
+    let inside: f64 = found[4].iter().sum();
+    // Some of the logistic tails lie outside.
+    assert!(inside > 3990.0 && inside <= 4000.0, "{inside}");
+    assert!((mass / 4000.0 - 1.0).abs() < 5e-3, "{mass}");
+    let middle = 100 * 80 + 40;
+    // Density of two logistic ones at their centres, 4000/(4·4 · 4·2).
+    assert!((found[2][middle] / 31.25 - 1.0).abs() < 0.15, "{}", found[2][middle]);
+    assert!(found[3][middle] > 0.0 && found[3][middle] < 0.1 * found[2][middle], "{}", found[3][middle]);
+
+    // The same bytes on more threads; other kernels, other bytes.
+    let bytes = |name: &str| std::fs::read(folder.path(name)).expect("the table");
+    for (more, is_same) in
+        [(vec!["--threads", "3"], true), (vec!["--round"], false), (vec!["--exact"], false)]
+    {
+        let mut arguments = vec!["density", "points.csv", "--out", "other.parquet", "--weight", "m"];
+        arguments.extend(DOMAIN);
+        arguments.extend(more.clone());
+        folder.lamella(&arguments).exits(0);
+        assert_eq!(bytes("other.parquet") == bytes("density.parquet"), is_same, "{more:?}");
+    }
+}
+
+/// A table of ours says its units; a scene's particles are points of a density.
+#[test]
+fn points_have_units() {
+    let folder = Folder::new();
+    folder.write("points.csv", points(300));
+    let mut arguments = vec!["density", "points.csv", "--out", "a.parquet", "--cells", "200,80"];
+    let plain = [arguments.clone(), vec!["--domain", "0..100, 0..40"]].concat();
+    folder.lamella(&plain).exits(0);
+    arguments[3] = "b.parquet";
+    folder.lamella(&[arguments, vec!["--domain", "0..100 cm, 0..40 cm"]].concat()).exits(0);
+    let read = |name: &str| columns(&folder.path(name), &["density"]).remove(0);
+    let (plain, metres) = (read("a.parquet"), read("b.parquet"));
+    for (plain, metres) in plain.iter().zip(metres).filter(|(plain, _)| **plain > 1e-6) {
+        assert!((metres / plain / 1e4 - 1.0).abs() < 1e-6, "{metres}, {plain}");
+    }
+}
+
+#[test]
+fn what_is_wrong_is_said_in_one_sentence() {
+    let folder = Folder::new();
+    folder.write("points.csv", "x,y\n1,2\n3,oops\n");
+    folder.write("heavy.csv", "x,m\n1,2\n3,-1\n");
+    folder.write("far.csv", "x\n1000\n");
+    let cases: [(&[&str], i32, &str); 10] = [
+        (&["points.csv", "--domain", "0..1", "--cells", "4,4"], 2, "--cells has 2 numbers for 1 axes"),
+        (&["points.csv", "--domain", "0..1,0..1", "--cells", "4,4"], 2, "line 3"),
+        (&["points.csv", "--domain", "0..1", "--cells", "0"], 2, "1 to 100 million cells"),
+        (&["points.csv", "--domain", "0..1", "--cells", "18446744073709551615"], 2, "1 to 100 million cells"),
+        (&["points.csv", "--domain", "1..0", "--cells", "4"], 2, "is empty"),
+        (&["points.csv", "--domain", "0..1 parsec", "--cells", "4"], 2, "no unit"),
+        (&["points.csv", "--domain", "0..1", "--cells", "4", "--columns", "depth"], 2, "depth"),
+        (
+            &["heavy.csv", "--domain", "0..9", "--cells", "4", "--weight", "m"],
+            2,
+            "a weight is below zero (line 3",
+        ),
+        (
+            &["far.csv", "--domain", "0..9", "--cells", "4"],
+            2,
+            "no point with a weight lies within the domain",
+        ),
+        (&["nowhere.csv", "--domain", "0..9", "--cells", "4"], 2, "nowhere.csv"),
+    ];
+    for (arguments, code, text) in &cases {
+        let arguments = [&["density"], *arguments, &["--out", "density.parquet"]].concat();
+        folder.lamella(&arguments).exits(*code).says(text);
+        assert!(!folder.path("density.parquet").exists());
+    }
+}
