@@ -2,6 +2,8 @@
 //!
 //! Owns cells, levels of coarser ones, and windows on them. May use nothing. It deliberately knows no particle.
 
+#![allow(clippy::needless_range_loop)] // An axis belongs to several arrays at once.
+
 /// Axes of every lattice: those that a domain does not have come first, with one cell.
 pub const AXES: usize = 3;
 
