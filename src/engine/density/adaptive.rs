@@ -191,7 +191,7 @@ impl Search<'_> {
         let (lattice, d) = (self.lattice, self.d);
         let deviations = tally.deviations();
         let n: f64 = self.counts.iter().sum();
-        let smallest = lattice.axes().map(|axis| lattice.edge[axis]).fold(f64::INFINITY, f64::min);
+        let smallest = lattice.smallest();
         let mean: f64 = lattice.axes().map(|axis| deviations[axis].max(smallest)).product();
         let reference = pow(mean, 1.0 / d) * pow(4.0 / ((d + 2.0) * n), 1.0 / (d + 4.0));
         let h = match self.adaptive.start {
@@ -217,14 +217,15 @@ impl Search<'_> {
 
     /// Bandwidths along axes within their bounds, and what follows from them.
     fn limit(&self, cell: &mut Cell, h: [f64; AXES]) {
+        let smallest = self.lattice.smallest();
         let mut product = 1.0;
         let mut own = [1.0; AXES];
         for axis in self.lattice.axes() {
             let [low, high] = self.limits.kernel[axis];
             own[axis] = h[axis].clamp(low, high);
             if self.adaptive.is_fast {
-                cell.h_class[axis] = class_of(ln(own[axis]));
-                own[axis] = bandwidth_of(cell.h_class[axis]);
+                cell.h_class[axis] = class_of(ln(own[axis] / smallest));
+                own[axis] = smallest * bandwidth_of(cell.h_class[axis]);
             }
             product *= own[axis];
         }
@@ -314,6 +315,7 @@ impl Search<'_> {
         let beta = 2.0 / ((d + 4.0) * (d + 6.0));
         let virtual_n = d * ln((8.0 * PI).sqrt() * cell.sigma) + 2.0 * ln(cell.n) - ln(cell.rho);
         let common = self.constants.curvature + beta * virtual_n + ln(cell.h);
+        let smallest = self.lattice.smallest();
         let [low, high] = self.limits.curvature.map(ln);
         for axis in self.lattice.axes() {
             let of_other = |other: usize| {
@@ -324,8 +326,9 @@ impl Search<'_> {
             let square = cell.s[axis] * cell.s[axis];
             let log = common - ln(sum / ((d + 4.0) * square * square)) / (d + 6.0);
             let log = log.clamp(low, high);
-            cell.g_class[axis] = class_of(log);
-            cell.g[axis] = if self.adaptive.is_fast { bandwidth_of(cell.g_class[axis]) } else { exp(log) };
+            cell.g_class[axis] = class_of(log - ln(smallest));
+            cell.g[axis] =
+                if self.adaptive.is_fast { smallest * bandwidth_of(cell.g_class[axis]) } else { exp(log) };
         }
     }
 
@@ -427,7 +430,14 @@ impl Search<'_> {
         let classes = || self.cells.iter().map(|cell| cell.h_class[axis]);
         let range = (classes().min()?, classes().max()?);
         let is_used = axis + self.lattice.d >= AXES && self.adaptive.is_fast;
-        is_used.then(|| Table::new(range, (self.lattice.cells[axis], self.lattice.edge[axis]), REACH, fill))
+        is_used.then(|| {
+            Table::new(
+                range,
+                (self.lattice.cells[axis], self.lattice.edge[axis] / self.lattice.smallest()),
+                REACH,
+                fill,
+            )
+        })
     }
 
     fn finish(self, tally: &Tally, unit: f64, (history, is_settled): (Vec<f64>, bool)) -> Estimate {

@@ -10,12 +10,11 @@ use crate::maths::vector::exp;
 /// Logarithm of the ratio of two classes.
 const STEP: f64 = 0.01;
 
-/// The class of a bandwidth by the logarithm of its length in m.
+/// The class of a bandwidth by its logarithm; all are over the shortest edge of a cell, so that no unit shows in them.
 pub fn class_of(log: f64) -> i64 {
     (log / STEP).round() as i64
 }
 
-/// m
 pub fn bandwidth_of(class: i64) -> f64 {
     exp(STEP * class as f64)
 }
@@ -32,7 +31,7 @@ pub struct Table {
 pub type Fill<'f> = &'f (dyn Fn(Line, f64, usize, &mut Taps) + Sync);
 
 impl Table {
-    /// Of all classes between two, on an axis of so many cells of a size, m; kernels end at so many bandwidths.
+    /// Of all classes between two, on an axis of so many cells of a size; kernels end at so many bandwidths.
     pub fn new((first, last): (i64, i64), (n, edge): (usize, f64), reach: f64, fill: Fill) -> Self {
         let kernel = |class: i64| {
             let bandwidth = bandwidth_of(class) / edge;

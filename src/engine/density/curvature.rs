@@ -73,7 +73,7 @@ pub fn curvatures(
 
 /// From which bandwidth on, m, a cascade is cheaper than kernels one by one, by numbers of additions.
 fn narrowest(lattice: &Lattice, cells: &[Cell], window: &Window) -> f64 {
-    let smallest = lattice.axes().map(|axis| lattice.edge[axis]).fold(f64::INFINITY, f64::min);
+    let smallest = lattice.smallest();
     let n_window: f64 = (0..AXES).map(|axis| (window.end[axis] - window.first[axis]) as f64).product();
     let stencil =
         |g: f64| lattice.axes().map(move |axis| 2.0 * CURVATURE_REACH * g / lattice.edge[axis] + 1.0);
@@ -118,7 +118,7 @@ impl<'a> Kernels<'a> {
             let classes = || cells().map(|cell| cell.g_class[along]);
             let Some(range) = classes().min().zip(classes().max()) else { continue };
             for axis in lattice.axes() {
-                let shape = (lattice.cells[axis], lattice.edge[axis]);
+                let shape = (lattice.cells[axis], lattice.edge[axis] / lattice.smallest());
                 let table = Table::new(range, shape, CURVATURE_REACH, &|line, own, b, taps| {
                     kernels.work_out((along, axis), (line, own), b, taps);
                 });

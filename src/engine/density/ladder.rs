@@ -50,7 +50,7 @@ impl Ladder {
         field: Field,
         (least, most): (f64, f64),
     ) -> Self {
-        let smallest = lattice.axes().map(|axis| lattice.edge[axis]).fold(f64::INFINITY, f64::min);
+        let smallest = lattice.smallest();
         let narrowest = NARROWEST * smallest;
         let place = |width: f64| 2.0 * (ln((width / narrowest).max(1.0)) / std::f64::consts::LN_2);
         let (first, last) = (place(least) as usize, place(most) as usize + 1);

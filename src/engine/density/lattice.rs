@@ -68,9 +68,14 @@ impl Lattice {
         [idx / (ny * nz), idx / nz % ny, idx % nz]
     }
 
+    /// The shortest edge of a cell, m.
+    pub fn smallest(&self) -> f64 {
+        self.axes().map(|axis| self.edge[axis]).fold(f64::INFINITY, f64::min)
+    }
+
     /// Cells put together to a level: about `2^level` of the smallest ones along each axis.
     pub fn level(&self, level: u32) -> [usize; AXES] {
-        let smallest = self.axes().map(|axis| self.edge[axis]).fold(f64::INFINITY, f64::min);
+        let smallest = self.smallest();
         let wanted = (1_u64 << level) as f64 * smallest * (1.0 + 1e-9);
         let mut factors = [1; AXES];
         for axis in self.axes() {
@@ -85,7 +90,7 @@ impl Lattice {
 
     /// The finest level but one whose cells are no longer than a length, along any axis.
     pub fn level_of(&self, length: f64) -> u32 {
-        let smallest = self.axes().map(|axis| self.edge[axis]).fold(f64::INFINITY, f64::min);
+        let smallest = self.smallest();
         let mut level = 0;
         while level < MOST_LEVEL && (2_u64 << level) as f64 * smallest <= length {
             level += 1;
