@@ -166,17 +166,23 @@ fn a_mixture_of_narrow_and_wide_is_as_wrong_as_independently_found() {
 }
 
 /// Relative L2 errors of normal densities in a plane, by sample.
-fn errors_in_plane(deviations: [f64; 2], (variant, is_fast): (Variant, bool)) -> Vec<f64> {
+fn errors_in_plane(deviations: [f64; 2], variant: Variant, n_samples: u64) -> Vec<f64> {
     const N: usize = 10_000;
     let cells = deviations.map(|deviation| (8.0 * deviation) as usize);
     let lattice = Lattice::new(&[(cells[0], 1.0, CLOSED), (cells[1], 1.0, CLOSED)]).unwrap();
-    (0..12)
+    let is_fast = variant == Variant::Corrected;
+    (0..n_samples)
         .map(|sample| {
             let mut draws = Draws(7919 * sample + 5);
             let place = |axis: usize, z: f64| 4.0 * deviations[axis] + deviations[axis] * z;
-            let x: Vec<f64> = (0..N).map(|_| place(0, draws.normal())).collect();
-            let y: Vec<f64> = (0..N).map(|_| place(1, draws.normal())).collect();
-            let tally = Tally::of(&lattice, &[0.0, 0.0], &[&x, &y], None);
+            // Of two clouds that differ by the names of axes the points do, too.
+            let first = usize::from(deviations[1] > deviations[0]);
+            let mut x = [Vec::new(), Vec::new()];
+            for _ in 0..N {
+                x[first].push(place(first, draws.normal()));
+                x[1 - first].push(place(1 - first, draws.normal()));
+            }
+            let tally = Tally::of(&lattice, &[0.0, 0.0], &[&x[0], &x[1]], None);
             let adaptive = Adaptive { tolerance: 1e-3, variant, is_fast, ..Adaptive::default() };
             let found = estimate(&lattice, &tally, &adaptive, Width::widest());
             let (mut square, mut all) = (0.0, 0.0);
@@ -197,24 +203,19 @@ fn errors_in_plane(deviations: [f64; 2], (variant, is_fast): (Variant, bool)) ->
 #[test]
 fn densities_in_a_plane_prefer_no_axis() {
     for (deviations, independent) in [([10.0, 10.0], 0.0538), ([20.0, 5.0], 0.0645), ([5.0, 20.0], 0.0658)] {
-        for is_fast in [false, true] {
-            let found = errors_in_plane(deviations, (Variant::Corrected, is_fast));
-            let most = 1.1 * independent;
-            assert!(
-                mean(&found) < most,
-                "{deviations:?}, fast {is_fast}: {} ± {}",
-                mean(&found),
-                scatter(&found)
-            );
-        }
+        let found = errors_in_plane(deviations, Variant::Corrected, 12);
+        let most = 1.1 * independent;
+        assert!(mean(&found) < most, "{deviations:?}: {} ± {}", mean(&found), scatter(&found));
     }
-    let of = |variant: Variant| {
-        let found = [[20.0, 5.0], [5.0, 20.0]].map(|own| errors_in_plane(own, (variant, false)));
-        let both = (scatter(&found[0]).powi(2) + scatter(&found[1]).powi(2)).sqrt();
-        (mean(&found[1]) - mean(&found[0])) / both
+    let of = |variant: Variant, n_samples: u64| {
+        let [one, other] = [[20.0, 5.0], [5.0, 20.0]].map(|own| errors_in_plane(own, variant, n_samples));
+        one.iter().zip(&other).map(|(one, other)| (other / one - 1.0).abs()).collect::<Vec<f64>>()
     };
-    assert!(of(Variant::Corrected).abs() < 3.0);
-    assert!(of(Variant::Released) > 5.0);
+    let same = of(Variant::Corrected, 3);
+    assert!(same.iter().all(|change| *change < 1e-3), "{same:?}");
+    // With its defects; in full, as these are not made with short cuts.
+    let other = of(Variant::Released, 3);
+    assert!(other.iter().all(|change| *change > 0.02), "{other:?}");
 }
 
 /// P3-d: walls keep a uniform density; ends that are joined keep it, too; where nothing stays there is none.

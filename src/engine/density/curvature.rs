@@ -11,8 +11,8 @@ use super::taps::{CURVATURE_REACH, Curvature, Integral, Line, Smooth, Taps};
 use crate::maths::vector::{ln, pow};
 use crate::maths::wide::Width;
 
-/// Bandwidths of a cascade: a factor of `2^{1/4}` apart.
-const STEP: f64 = 4.0;
+/// Bandwidths of a cascade: a factor of √2 apart.
+const STEP: f64 = 2.0;
 
 /// Bandwidths over the smallest edge of a cell, from which on there may be cascades.
 const NARROWEST: [f64; 6] = [2.0, 2.83, 4.0, 5.66, 8.0, f64::INFINITY];
