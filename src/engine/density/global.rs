@@ -161,8 +161,6 @@ struct Search<'a> {
     limits: Limits,
     counts: Vec<f64>,
     n: f64,
-    /// Sum of squares of what single particles count.
-    squares: f64,
 }
 
 impl<'a> Search<'a> {
@@ -174,13 +172,7 @@ impl<'a> Search<'a> {
             counts.fill(0.0);
         }
         let n: f64 = counts.iter().sum();
-        let squares = match weighing {
-            Weighing::OfAll | Weighing::Mean if is_sound => {
-                tally.squares.iter().map(|square| square / (unit * unit)).sum()
-            }
-            _ => n,
-        };
-        Self { lattice, limits: Limits::new(lattice, None), counts, n, squares }
+        Self { lattice, limits: Limits::new(lattice, None), counts, n }
     }
 
     /// Bandwidths within their bounds; those that are no number are as wide as can be.
@@ -207,7 +199,7 @@ impl<'a> Search<'a> {
     }
 
     fn spectrum(&self, tally: &Tally) -> Spectrum {
-        Spectrum::new(self.lattice, (&tally.cells, &self.counts), self.squares)
+        Spectrum::new(self.lattice, (&tally.cells, &self.counts))
     }
 
     fn smallest(&self) -> f64 {

@@ -168,12 +168,12 @@ pub struct Spectrum {
 }
 
 impl Spectrum {
-    /// - Equation: `P_k = (Σ_b c_b φ_k(x_b))²`, of which `S/|Ω|` is by single particles.
-    /// - Symbols: `c_b` counts, `φ_k` products of waves, `S` sum of squares of what single particles count, `|Ω|` volume.
+    /// - Equation: `P_k = (Σ_b c_b φ_k(x_b))²`, of which `N/|Ω|` is by single particles.
+    /// - Symbols: `c_b` counts, `N` their sum, `φ_k` products of waves, `|Ω|` volume.
     /// - Range: any counts.
     /// - Source: methods, section 2.3.
     /// - Shape: as many as cells.
-    pub fn new(lattice: &Lattice, (cells, counts): (&[u32], &[f64]), squares: f64) -> Self {
+    pub fn new(lattice: &Lattice, (cells, counts): (&[u32], &[f64])) -> Self {
         let unit = lattice.axes().map(|axis| lattice.edge[axis]).fold(f64::INFINITY, f64::min);
         let mut edge = [1.0; AXES];
         lattice.axes().for_each(|axis| edge[axis] = lattice.edge[axis] / unit);
@@ -195,13 +195,13 @@ impl Spectrum {
         }
         let volume: f64 = edge.iter().product();
         values.iter_mut().for_each(|value| *value = *value * *value / volume);
-        let own = squares / (volume * lattice.n_cells() as f64);
+        let own = counts.iter().sum::<f64>() / (volume * lattice.n_cells() as f64);
         Self { d: lattice.d, cells: lattice.cells, edge, numbers, powers: values, own }
     }
 
     /// Integrated products of second derivatives of counts that are smoothed by a Gaussian.
     ///
-    /// - Equation: `ψ_ij = Σ_k κ_i² κ_j² [(P_k − S/|Ω|) e^{−Σ κ_a²(g_a² − Δ_a²/12)} + (S/|Ω|) e^{−Σ κ_a² g_a²}]`, or
+    /// - Equation: `ψ_ij = Σ_k κ_i² κ_j² [(P_k − N/|Ω|) e^{−Σ κ_a²(g_a² − Δ_a²/12)} + (N/|Ω|) e^{−Σ κ_a² g_a²}]`, or
     ///   `Σ_k κ_i² κ_j² P_k e^{−Σ κ_a² g_a²}` where that is rougher, as it is where particles stand in order.
     /// - Symbols: `g_a` standard deviation along axis a; `Δ_a` size of cells, whose variance pairs of particles have already.
     /// - Range: g of at least one cell; better where it is wider.
@@ -273,24 +273,14 @@ impl Spectrum {
 
     /// The integral of a squared derivative of counts on a line that are smoothed by a Gaussian.
     ///
-    /// - Equation: `Σ_k κ^{2s} [(P_k − S/L) e^{−κ²(t − Δ²/12)} + (S/L) e^{−κ² t}]`, or `Σ_k κ^{2s} P_k e^{−κ² t}`.
+    /// - Equation: `Σ_k κ^{2s} P_k e^{−κ² t}`.
     /// - Symbols: `s` order, `t` variance; else as for [`Self::products`].
-    /// - Range: one axis.
+    /// - Range: one axis. What cells take of pairs of particles is not given back: high derivatives see little of them.
     /// - Source: methods, section 2.3, `f_s(t)`.
-    /// - Shape: above zero; falls with t.
+    /// - Shape: never negative; falls with t.
     pub fn roughness(&self, s: i32, t: f64) -> f64 {
-        let [all, pairs] = variances(t, 1.0);
-        let (mut plain, mut more) = (0.0, 0.0);
-        for (power, &number) in self.powers.iter().zip(&self.numbers[AXES - 1]) {
-            let of_pairs = faded(number * pairs);
-            if of_pairs > 0.0 {
-                let of_all = faded(number * all);
-                let derivative = number.powi(s);
-                plain += derivative * power * of_all;
-                more += derivative * (power - self.own) * (of_pairs - of_all);
-            }
-        }
-        plain + more.max(0.0)
+        let waves = self.powers.iter().zip(&self.numbers[AXES - 1]);
+        waves.map(|(power, number)| number.powi(s) * power * faded(number * t)).sum()
     }
 }
 
@@ -303,4 +293,61 @@ fn variances(all: f64, edge: f64) -> [f64; 2] {
 /// `e^{−x}`, nothing where it does not matter.
 fn faded(x: f64) -> f64 {
     if x < NOTHING { exp_of_negative(-x) } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ENDS: [[End; 2]; 5] = [
+        [End::Mirror; 2],
+        [End::Wrap; 2],
+        [End::Sink; 2],
+        [End::Mirror, End::Sink],
+        [End::Sink, End::Mirror],
+    ];
+
+    fn counts(n: usize) -> Vec<f64> {
+        (0..n).map(|k| ((k * 37 + 11) % 101) as f64).collect()
+    }
+
+    /// Waves are orthonormal: nothing of a square is lost, and waves of single cells are those of their definition.
+    #[test]
+    fn waves_hold_all_of_a_square() {
+        for ends in ENDS {
+            for n in [1, 2, 3, 8, 13, 30] {
+                for other in [1, 7] {
+                    let lattice = Lattice::new(&[(n, 0.5, ends), (other, 0.2, ENDS[0])]);
+                    let Some(lattice) = lattice else { continue };
+                    let cells: Vec<u32> = (0..lattice.n_cells() as u32).collect();
+                    let counts = counts(cells.len());
+                    let spectrum = Spectrum::new(&lattice, (&cells, &counts));
+                    let all: f64 = spectrum.powers.iter().sum();
+                    let square = counts.iter().map(|count| count * count).sum::<f64>() / 2.5;
+                    assert!((all / square - 1.0).abs() < 1e-12, "{ends:?}, {n}, {other}: {all} for {square}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn amplitudes_are_sums_over_cells() {
+        for ends in ENDS {
+            for n in [1, 5, 12] {
+                let waves = Waves::new(n, ends);
+                let values = counts(n);
+                let mut found = values.clone();
+                waves.transform(&mut found, 1);
+                for (at, found) in found.iter().enumerate() {
+                    let (_, is_sine) = waves.wave(at);
+                    let term = |(b, value): (usize, &f64)| {
+                        let angle = waves.number(at) * (b as f64 + 0.5);
+                        value * if is_sine { scalar::sin(angle) } else { scalar::cos(angle) }
+                    };
+                    let sum = waves.square(at).sqrt() * values.iter().enumerate().map(term).sum::<f64>();
+                    assert!((found - sum).abs() < 1e-11, "{ends:?}, {n}, {at}: {found} for {sum}");
+                }
+            }
+        }
+    }
 }
