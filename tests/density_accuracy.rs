@@ -366,6 +366,17 @@ fn bits_hang_neither_on_threads_nor_on_vectors() {
     }
 }
 
+/// Masses that are none, or below zero, make a density that is none.
+#[test]
+fn masses_that_are_none_make_no_density() {
+    let lattice = line(0.0, 1.0, 0.1);
+    for mass in [f64::NAN, f64::INFINITY, -1.0] {
+        let tally = Tally::of(&lattice, &[0.0], &[&[0.5, 0.52]], Some(&[1.0, mass]));
+        let found = estimate(&lattice, &tally, &Adaptive::default(), Width::widest());
+        assert!(found.density.iter().all(|density| density.is_nan()), "{mass}");
+    }
+}
+
 /// Nothing, one particle, all in one place, masses of zero, more axes than cells: a number everywhere, and all mass.
 #[test]
 fn odd_clouds_have_densities() {

@@ -7,7 +7,8 @@ use clap::ValueEnum;
 use lamella::data::{Column, DataFile, Place, ReadError};
 use lamella::diagnostic::{Diagnostic, codes};
 use lamella::engine::density::{
-    Adaptive, End, Estimate, Lattice, Shape, Start, Tally, Variant, Weighing, estimate,
+    Adaptive, Cell, End, Estimate, Lattice, Rule, Shape, Start, Tally, Variant, Weighing, estimate, global,
+    histogram,
 };
 use lamella::maths::wide::Width;
 use lamella::table::{DensityCell, DensityTable, write_density};
@@ -41,10 +42,10 @@ pub(crate) struct Arguments {
     /// What both ends of each axis are: one word for all, or one per axis
     #[arg(long, value_name = "WORD,…", value_enum, value_delimiter = ',', default_value = "reflect")]
     ends: Vec<EndName>,
-    /// Kernels of one size along all axes
-    #[arg(long)]
-    round: bool,
-    /// Least and largest bandwidth, in the unit of the domain
+    /// What every point is spread by
+    #[arg(long, value_enum, default_value_t = KernelName::Adaptive)]
+    kernel: KernelName,
+    /// Least and largest bandwidth of kernels that differ, in the unit of the domain
     #[arg(long, value_name = "LOW..HIGH", value_parser = Axis::parse)]
     bandwidth: Option<Axis>,
     /// What counts where weights differ
@@ -71,6 +72,27 @@ pub(crate) struct Arguments {
     /// Parquet file to write
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[value(rename_all = "snake_case")]
+enum KernelName {
+    /// Kernels of locally best size and shape
+    Adaptive,
+    /// Kernels of locally best size, the same along all axes
+    Round,
+    /// One kernel for all, of the best size by the density's own roughness (iterated plug-in)
+    PlugIn,
+    /// One kernel for all, of the best size for a normal density
+    NormalReference,
+    /// The cell itself
+    Histogram,
+}
+
+impl KernelName {
+    fn word(self) -> String {
+        self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
+    }
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -145,7 +167,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
     }
     let adaptive = adaptive(arguments, points.factors[0]);
     let estimated = Instant::now();
-    let work = || estimate(&lattice, &tally, &adaptive, Width::widest());
+    let work = || spread(arguments.kernel, &lattice, &tally, &adaptive);
     let mut found = match arguments.threads {
         None => work(),
         Some(n) => rayon::ThreadPoolBuilder::new()
@@ -153,7 +175,7 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
             .build()
             .map_err(|error| failed(&format!("cannot start {n} threads: {error}")))?
             .install(work),
-    };
+    }?;
     let seconds = estimated.elapsed().as_secs_f64();
     let error = norm(&found.standard_error) / norm(&found.density);
     let table = tabulate(arguments, &points, (&lattice, &low), (&tally, &mut found));
@@ -161,6 +183,49 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
         .map_err(|error| Stopped::new(Exit::Failed, Diagnostic::error(codes::F103, error.to_string())))?;
     tell(terminal, &path, (&lattice, &tally, &found), (seconds, start.elapsed().as_secs_f64(), error))?;
     Ok(Exit::Done)
+}
+
+/// The density, as if kernels differed from cell to cell.
+fn spread(
+    kernel: KernelName,
+    lattice: &Lattice,
+    tally: &Tally,
+    adaptive: &Adaptive,
+) -> Result<Estimate, Stopped> {
+    let rule = match kernel {
+        KernelName::Adaptive | KernelName::Round => {
+            return Ok(estimate(lattice, tally, adaptive, Width::widest()));
+        }
+        KernelName::PlugIn => Rule::PlugIn(Shape::Stretched),
+        KernelName::NormalReference => Rule::NormalReference,
+        KernelName::Histogram => {
+            let (density, standard_error) = histogram(lattice, tally);
+            return Ok(Estimate {
+                density,
+                standard_error,
+                cells: Vec::new(),
+                history: vec![0.0],
+                is_settled: true,
+            });
+        }
+    };
+    let found = global(lattice, tally, rule, adaptive.weighing, Width::widest())
+        .map_err(|trouble| wrong(&trouble.to_string()))?;
+    let product: f64 = lattice.axes().map(|axis| found.bandwidths[axis]).product();
+    let h = lamella::maths::vector::pow(product, 1.0 / lattice.d as f64);
+    let cell = |&idx: &u32| Cell {
+        at: lattice.cell(idx as usize),
+        h,
+        s: found.bandwidths.map(|own| own / h),
+        ..Cell::default()
+    };
+    Ok(Estimate {
+        density: found.density,
+        standard_error: found.standard_error,
+        cells: tally.cells.iter().map(cell).collect(),
+        history: vec![h; found.n_loops + 1],
+        is_settled: found.is_settled,
+    })
 }
 
 /// Numbers in SI where units are known, the weights last; the factors of coordinates and the units of all.
@@ -248,7 +313,7 @@ fn lattice(arguments: &Arguments, points: &Points) -> Result<Lattice, Stopped> {
 fn adaptive(arguments: &Arguments, factor: f64) -> Adaptive {
     Adaptive {
         variant: if arguments.parity { Variant::Released } else { Variant::Corrected },
-        shape: if arguments.round { Shape::Round } else { Shape::Stretched },
+        shape: if arguments.kernel == KernelName::Round { Shape::Round } else { Shape::Stretched },
         start: Start::NormalReference,
         weighing: match arguments.weighing {
             WeighingName::All => Weighing::OfAll,
@@ -273,14 +338,16 @@ fn tabulate(
         let (name, unit) = (points.names[idx].clone(), points.units[idx].clone());
         (name, unit, low[idx], lattice.edge[axis], lattice.cells[axis])
     });
-    let cells =
-        found.cells.iter().zip(&tally.cells).zip(&tally.counts).map(|((cell, &idx), &count)| DensityCell {
-            idx: idx as usize,
-            n_particles: count as u64,
-            bandwidth: lattice.axes().map(|axis| cell.h * cell.s[axis]).collect(),
-            support: cell.sigma,
-            roughness: cell.roughness,
-        });
+    let unknown = Cell::default();
+    // A histogram has no kernels.
+    let of_cells = found.cells.iter().chain(std::iter::repeat(&unknown));
+    let cells = of_cells.zip(&tally.cells).zip(&tally.counts).map(|((cell, &idx), &count)| DensityCell {
+        idx: idx as usize,
+        n_particles: count as u64,
+        bandwidth: lattice.axes().map(|axis| cell.h * cell.s[axis]).filter(|h| *h > 0.0).collect(),
+        support: cell.sigma,
+        roughness: cell.roughness,
+    });
     let notes = serde_json::json!({
         "version": 1,
         "lamella": env!("CARGO_PKG_VERSION"),
@@ -288,11 +355,11 @@ fn tabulate(
         "columns": points.names,
         "exact": arguments.exact || arguments.parity,
         "parity": arguments.parity,
-        "round": arguments.round,
+        "kernel": arguments.kernel.word(),
         "tolerance": arguments.tolerance,
         "loops": found.history.len() - 1,
         "settled": found.is_settled,
-        "mean_bandwidth_by_loop": found.history,
+        "mean_bandwidth": found.history.last(),
         "weight_inside": tally.mass(),
         "effective_points": tally.effective(),
         "points_outside": tally.outside.0,
@@ -335,13 +402,17 @@ fn tell(
     };
     let state =
         if found.is_settled { "settled" } else { "not settled: more --loops, or a larger --tolerance" };
+    let kernels = match (found.cells.is_empty(), loops) {
+        (true, _) => "none".to_owned(),
+        (_, 0) => format!("bandwidth {}", significant(mean, 3)),
+        _ => format!("{loops} loops, {state}; mean bandwidth {}", significant(mean, 3)),
+    };
     terminal.product(&format!(
-        "points:     {n} in {} of {} cells{outside}\nkernels:    {loops} loops, {state}; mean bandwidth {}\nerror:      \
+        "points:     {n} in {} of {} cells{outside}\nkernels:    {kernels}\nerror:      \
          {} % by the number of points (L2 of the standard error over the density)\ntime:       {} for the density, {} in all\n\
          density:    {}\n",
         tally.cells.len(),
         lattice.n_cells(),
-        significant(mean, 3),
         significant(100.0 * error, 2),
         duration(seconds),
         duration(all),

@@ -55,7 +55,14 @@ pub fn transform(data: &mut Complex, n: [usize; 3]) {
     }
 }
 
-fn along(data: &mut Complex, n: usize, inner: usize) {
+/// The same along one axis of `n` rows, with `inner` numbers side by side in each.
+///
+/// - Equation: `Y_k = Σ_j X_j exp(−2πi k j/n)` for each of them.
+/// - Symbols: as for [`transform`].
+/// - Range: any finite numbers; n a [`good_size`], at least one number.
+/// - Source: as for [`transform`].
+/// - Shape: the array is overwritten; what is longer than `n inner` holds several such blocks.
+pub fn along(data: &mut Complex, n: usize, inner: usize) {
     let plan = Plan::new(n);
     let mut from = Complex::zeros(n * inner.min(COLUMNS));
     let mut to = from.clone();

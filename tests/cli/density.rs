@@ -51,13 +51,30 @@ fn points_of_a_text_file_become_a_density() {
     // The same bytes on more threads; other kernels, other bytes.
     let bytes = |name: &str| std::fs::read(folder.path(name)).expect("the table");
     for (more, is_same) in
-        [(vec!["--threads", "3"], true), (vec!["--round"], false), (vec!["--exact"], false)]
+        [(vec!["--threads", "3"], true), (vec!["--kernel", "round"], false), (vec!["--exact"], false)]
     {
         let mut arguments = vec!["density", "points.csv", "--out", "other.parquet", "--weight", "m"];
         arguments.extend(DOMAIN);
         arguments.extend(more.clone());
         folder.lamella(&arguments).exits(0);
         assert_eq!(bytes("other.parquet") == bytes("density.parquet"), is_same, "{more:?}");
+    }
+}
+
+/// All kernels keep what is inside, and say how wide they are.
+#[test]
+fn there_are_other_kernels() {
+    let folder = Folder::new();
+    folder.write("points.csv", points(2000));
+    for kernel in ["adaptive", "round", "plug_in", "normal_reference", "histogram"] {
+        let mut arguments =
+            vec!["density", "points.csv", "--out", "d.parquet", "--kernel", kernel, "--nonzero"];
+        arguments.extend(DOMAIN);
+        folder.lamella(&arguments).exits(0);
+        let found = columns(&folder.path("d.parquet"), &["density", "n_particles"]);
+        let [mass, inside] = [0.25 * found[0].iter().sum::<f64>(), found[1].iter().sum::<f64>()];
+        assert!((mass / inside - 1.0).abs() < 1e-12, "{kernel}: {mass} of {inside}");
+        assert!(found[0].iter().all(|density| *density > 0.0), "{kernel}");
     }
 }
 

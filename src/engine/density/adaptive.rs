@@ -124,6 +124,15 @@ pub struct Estimate {
     pub is_settled: bool,
 }
 
+impl Estimate {
+    /// Of particles whose masses are not finite and above zero.
+    fn unknown(lattice: &Lattice) -> Self {
+        let none = vec![f64::NAN; lattice.n_cells()];
+        let (density, standard_error) = (none.clone(), none);
+        Self { density, standard_error, cells: Vec::new(), history: vec![f64::NAN], is_settled: false }
+    }
+}
+
 struct Search<'a> {
     lattice: &'a Lattice,
     adaptive: &'a Adaptive,
@@ -170,6 +179,9 @@ pub fn estimate(lattice: &Lattice, tally: &Tally, adaptive: &Adaptive, width: Wi
         d: lattice.d as f64,
         constants: Constants::new(lattice.d as f64),
     };
+    if search.counts.iter().any(|count| !(count.is_finite() && *count > 0.0)) {
+        return Estimate::unknown(lattice);
+    }
     search.begin(tally);
     let mut history = vec![search.mean_bandwidth()];
     let mut ends = Ends::default();

@@ -8,15 +8,18 @@ mod bands;
 mod classes;
 mod curvature;
 mod direct;
+mod global;
 mod ladder;
 pub mod lattice;
 mod limits;
 mod rough;
 mod smoothed;
+mod spectrum;
 mod stencil;
 mod tally;
 mod taps;
 
 pub use adaptive::{Adaptive, Cell, Estimate, Shape, Start, Variant, estimate};
+pub use global::{Global, Rule, Trouble, global, histogram};
 pub use lattice::{End, Lattice};
 pub use tally::{Tally, Weighing};

@@ -44,6 +44,11 @@ impl Tally {
         let largest =
             masses.map_or(1.0, |masses| masses.iter().fold(0.0, |largest: f64, &own| largest.max(own)));
         let mut tally = Self { largest, ..Self::default() };
+        // Squares of what is far from its middle would drown the spread.
+        let origins: Vec<f64> =
+            positions.iter().zip(low).map(|(x, low)| x.first().copied().unwrap_or(*low)).collect();
+        let origins: Vec<f64> =
+            origins.iter().zip(low).map(|(x, low)| if x.is_finite() { *x } else { *low }).collect();
         for idx in 0..n {
             let mass = masses.map_or(1.0, |masses| masses[idx]);
             let (mut cell, mut is_inside) = (0, true);
@@ -61,8 +66,8 @@ impl Tally {
             }
             // Squares of the masses themselves might be beyond all numbers.
             let share = if largest > 0.0 { mass / largest } else { 0.0 };
-            for ((axis, x), low) in lattice.axes().zip(positions).zip(low) {
-                let x = x[idx] - low;
+            for ((axis, x), origin) in lattice.axes().zip(positions).zip(&origins) {
+                let x = x[idx] - origin;
                 tally.moments[axis][0] += share * x;
                 tally.moments[axis][1] += share * x * x;
             }
@@ -71,8 +76,8 @@ impl Tally {
             sums[1] += mass;
             sums[2] += share * share;
         }
-        // What has no mass has no density.
-        for (cell, sums) in of_cells.iter().enumerate().filter(|(_, sums)| sums[2] > 0.0) {
+        // What has no mass has no density; what has one that is no number is kept, to be refused.
+        for (cell, sums) in of_cells.iter().enumerate().filter(|(_, sums)| sums[2] != 0.0) {
             tally.cells.push(cell as u32);
             tally.counts.push(sums[0]);
             tally.masses.push(sums[1]);
