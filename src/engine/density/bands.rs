@@ -4,9 +4,12 @@
 //! only where there is something.
 
 use super::super::parallel::{self, Pool};
-use super::lattice::{AXES, Field};
+use super::lattice::{AXES, End, Field};
 use super::taps::{Integral, Line, REACH, Taps};
 use crate::maths::wide::Width;
+
+/// Cells near an end that have taps of their own, at most: these are as many each.
+const MOST_OWN: usize = 2048;
 
 /// What each cell of an axis takes of its neighbours.
 #[derive(Debug, Clone, Default)]
@@ -14,42 +17,66 @@ pub struct Band {
     /// Of cells far from the ends, from `reach` cells before them on.
     pub taps: Vec<f64>,
     pub reach: usize,
-    /// Of the first cells, and of the last ones.
+    /// Of the first cells, and of the last ones, where they are not those of cells beyond the ends.
     pub ends: [Vec<Taps>; 2],
     pub n: usize,
+    pub sides: [End; 2],
 }
 
 impl Band {
     /// A Gaussian on the cells of a level, integrated over them.
     pub fn gaussian(line: Line, integral: Integral, (deviation, width): (f64, f64)) -> Self {
         let reach = ((REACH * width).ceil() / line.factor as f64).ceil() as usize + 1;
-        Self::of(line, reach, &|line, cell, taps| {
-            line.gaussian_of_cell(integral, cell, (deviation, width), taps)
+        Self::of((line, reach), true, &|line, cell, taps| {
+            line.gaussian_of_cell(integral, cell, (deviation, width), taps);
         })
     }
 
-    /// What cells of a level take, none from farther than a reach: `fill` knows it of each cell.
-    pub fn of(line: Line, reach: usize, fill: &dyn Fn(Line, usize, &mut Taps)) -> Self {
+    /// What cells of a level take, none from farther than a reach: `fill` knows it of each cell. Where kernels and their
+    /// images are not just added, as where they are squared, cells near an end have taps of their own, as long as these are not
+    /// too many.
+    pub fn of((line, reach): (Line, usize), is_sum: bool, fill: &dyn Fn(Line, usize, &mut Taps)) -> Self {
         let n = line.n.div_ceil(line.factor);
         let of_cell = |line: Line, cell: usize| {
             let mut taps = Taps::default();
             fill(line, cell, &mut taps);
             taps
         };
+        let is_long = reach < n;
         let far = Line { n: (2 * reach + 1) * line.factor, ..line };
-        // Of a short line all cells are near an end.
-        let Taps { first, values } = if reach < n { of_cell(far, reach) } else { Taps::default() };
-        let n_ends = (reach + 1).min(n);
+        let Taps { first, mut values } = if is_long { of_cell(far, reach) } else { Taps::default() };
+        let reach = reach - first.min(reach);
+        values.truncate(2 * reach + 1);
+        // Fine cells beyond an end are those that it mirrors. Coarse ones are not, where the last one is narrower.
+        let is_folded = is_long && line.factor == 1 && (is_sum || reach > MOST_OWN);
+        let n_ends = if is_folded { 0 } else { (reach + 1).min(n) };
         let ends = [0, 1]
             .map(|end| (0..n_ends).map(|k| of_cell(line, if end == 0 { k } else { n - 1 - k })).collect());
-        Self { reach: reach - first.min(reach), taps: values, ends, n }
+        Self { reach, taps: values, ends, n, sides: line.ends }
     }
 
-    /// The taps of a cell that is near an end.
+    /// The taps of a cell that is near an end, where they are its own.
     fn near_end(&self, cell: usize) -> Option<&Taps> {
         let [first, last] = &self.ends;
         let from_end = self.n - 1 - cell;
         first.get(cell).or_else(|| last.get(from_end))
+    }
+
+    /// What stands in a cell, perhaps beyond an end: another one, and by which sign.
+    #[inline(always)]
+    fn folded(&self, cell: isize) -> Option<(usize, f64)> {
+        let n = self.n as isize;
+        let (end, mirrored, shifted) = match (cell < 0, cell >= n) {
+            (false, false) => return Some((cell as usize, 1.0)),
+            (true, _) => (self.sides[0], -1 - cell, cell + n),
+            _ => (self.sides[1], 2 * n - 1 - cell, cell - n),
+        };
+        let (other, sign) = match end {
+            End::Mirror => (mirrored, 1.0),
+            End::Wrap => (shifted, 1.0),
+            End::Sink => (mirrored, -1.0),
+        };
+        (other >= 0 && other < n).then_some((other as usize, sign))
     }
 }
 
@@ -125,12 +152,9 @@ impl pulp::NullaryFnOnce for Rows<'_> {
     fn call(self) {
         let Self { rows, length, first, band, buffer } = self;
         for row in rows.chunks_mut(length) {
-            let extent = extent(row);
-            if extent.0 < extent.1 {
-                buffer.clear();
-                buffer.extend_from_slice(row);
-                row.fill(0.0);
-                within_row(buffer, first, band, extent, row);
+            let own = extent(row);
+            if own.0 < own.1 {
+                within_row(row, first, band, buffer);
             }
         }
     }
@@ -173,11 +197,13 @@ impl pulp::NullaryFnOnce for Across<'_, '_> {
                 Some(taps) => (taps.first as isize, &taps.values[..]),
                 None => (cell as isize - band.reach as isize, &band.taps[..]),
             };
-            let start = start - first as isize;
-            let from = (begin as isize - start).clamp(0, taps.len() as isize) as usize;
-            let to = (end as isize - start).clamp(from as isize, taps.len() as isize) as usize;
-            for (k, tap) in (from..to).zip(&taps[from..to]) {
-                let other = (start + k as isize) as usize * n;
+            for (k, tap) in taps.iter().enumerate() {
+                let Some((other, sign)) = band.folded(start + k as isize) else { continue };
+                if other < first + begin || other >= first + end {
+                    continue;
+                }
+                let tap = sign * tap;
+                let other = (other - first) * n;
                 let source = &buffer[other + low..other + high];
                 for (value, source) in target.iter_mut().zip(source) {
                     *value += tap * source;
@@ -189,35 +215,42 @@ impl pulp::NullaryFnOnce for Across<'_, '_> {
 
 /// Smooths a row along itself.
 #[inline(always)]
-fn within_row(source: &[f64], first: usize, band: &Band, (low, high): (usize, usize), target: &mut [f64]) {
-    if low >= high {
-        return;
+fn within_row(row: &mut [f64], first: usize, band: &Band, buffer: &mut Vec<f64>) {
+    let (n, reach) = (row.len(), band.reach);
+    // With what stands beyond both ends of the row.
+    buffer.clear();
+    let beyond = |at: isize| match band.folded(first as isize + at) {
+        Some((cell, sign)) if cell >= first && cell < first + n => sign * row[cell - first],
+        _ => 0.0,
+    };
+    for at in 0..reach {
+        buffer.push(beyond(at as isize - reach as isize));
     }
-    let n = source.len();
-    let (n_first, n_last) = (band.ends[0].len(), band.ends[1].len());
-    // Cells of the middle, counted in the row.
-    let begin = n_first.saturating_sub(first).min(n);
-    let end = (band.n - n_last).saturating_sub(first).clamp(begin, n);
+    buffer.extend_from_slice(row);
+    for at in 0..reach {
+        buffer.push(beyond((n + at) as isize));
+    }
+    row.fill(0.0);
+    let (low, high) = extent(buffer);
     for (k, tap) in band.taps.iter().enumerate() {
-        // Cell i takes source i + k − reach.
-        let from = (low + band.reach).saturating_sub(k).max(begin);
-        let to = (high + band.reach).saturating_sub(k).min(end);
-        if from >= to {
-            continue;
-        }
-        let source = &source[from + k - band.reach..to + k - band.reach];
-        for (value, source) in target[from..to].iter_mut().zip(source) {
-            *value += tap * source;
+        let (from, to) = (low.saturating_sub(k), high.saturating_sub(k).min(n));
+        if from < to {
+            for (value, source) in row[from..to].iter_mut().zip(&buffer[from + k..to + k]) {
+                *value += tap * source;
+            }
         }
     }
+    let [of_first, of_last] = [&band.ends[0], &band.ends[1]].map(Vec::len);
+    let begin = of_first.saturating_sub(first).min(n);
+    let end = (band.n - of_last).saturating_sub(first).clamp(begin, n);
     for at in (0..begin).chain(end..n) {
         let Some(taps) = band.near_end(first + at) else { continue };
         let mut sum = 0.0;
         for (cell, tap) in (taps.first..).zip(&taps.values) {
-            if cell >= first + low && cell < first + high {
-                sum += tap * source[cell - first];
+            if cell >= first && cell < first + n {
+                sum += tap * buffer[reach + cell - first];
             }
         }
-        target[at] = sum;
+        row[at] = sum;
     }
 }

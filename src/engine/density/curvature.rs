@@ -255,6 +255,6 @@ impl Factors {
         let edge = lattice.edge[axis];
         let line = Line { n: lattice.cells[axis], factor: 1, ends: lattice.ends[axis] };
         let reach = (CURVATURE_REACH * self.g / edge).ceil() as usize + 1;
-        Band::of(line, reach, &|line, b, taps| self.fill(line, (axis, edge), b, taps))
+        Band::of((line, reach), true, &|line, b, taps| self.fill(line, (axis, edge), b, taps))
     }
 }

@@ -355,7 +355,7 @@ fn spread(
         field.values[cell as usize] = *mass;
     }
     for axis in lattice.axes() {
-        // On one cell there is nowhere to go, and taps know one image at each end.
+        // On one cell there is nowhere to go.
         if lattice.cells[axis] > 1 {
             let line = Line { n: lattice.cells[axis], factor: 1, ends: lattice.ends[axis] };
             let band = band(line, bandwidths[axis] / lattice.edge[axis], is_squared);
@@ -372,7 +372,7 @@ fn band(line: Line, own: f64, is_squared: bool) -> Band {
         return Band::gaussian(line, integral, (own, own));
     }
     let reach = (REACH * own).ceil() as usize + 1;
-    Band::of(line, reach, &|line: Line, cell: usize, taps: &mut Taps| {
+    Band::of((line, reach), false, &|line: Line, cell: usize, taps: &mut Taps| {
         line.gaussian(integral, cell, (own, own), taps);
         taps.values.iter_mut().for_each(|tap| *tap *= *tap);
     })
