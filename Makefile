@@ -34,6 +34,7 @@ bench: cargo ## Measure the hot loops (takes minutes; close other programs first
 	$(CARGO) bench --bench speciation
 	$(CARGO) bench --bench flow
 	$(CARGO) bench --bench exchange
+	$(CARGO) bench --bench density
 
 bless: cargo ## Accept the present output of all snapshot tests; look at the difference before you commit
 	INSTA_UPDATE=always LAMELLA_BLESS=1 $(CARGO) test --release

@@ -85,7 +85,7 @@ pub struct Global {
 ///
 /// - Equation: `f = Σ_b m_b Π_i W_i/V`, standard error `√(Σ_b (Σ m²)_b Π_i W_i²)/V`.
 /// - Symbols: `m_b` mass in a cell, `V` volume of a cell, `W_i` Gaussians integrated over cells.
-/// - Range: bandwidths within the limits of [`Limits`]; an axis of one cell is not smoothed.
+/// - Range: bandwidths within limits, as those of kernels that differ are; an axis of one cell is not smoothed.
 /// - Source: methods, (2.1), section 2.4, section 4.5.
 /// - Shape: one value per cell; mass stays between mirrors.
 pub fn global(
