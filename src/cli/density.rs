@@ -1,10 +1,9 @@
 //! `lamella density`: from points of any table to a density on cells.
 
-use super::files::read_data;
+use super::density_points::Points;
 use super::text::{duration, significant};
 use super::{CommandResult, Exit, Stopped, Terminal};
 use clap::ValueEnum;
-use lamella::data::{Column, DataFile, Place, ReadError};
 use lamella::diagnostic::{Diagnostic, codes};
 use lamella::engine::density::{
     Adaptive, Cell, End, Estimate, Lattice, Rule, Shape, Start, Tally, Variant, Weighing, estimate, global,
@@ -26,19 +25,22 @@ const MOST_CELLS: usize = 100_000_000;
 #[derive(clap::Args)]
 pub(crate) struct Arguments {
     /// CSV or Parquet file
-    file: PathBuf,
+    pub(super) file: PathBuf,
     /// Where the cells are, per axis, such as "0..200 m, 0..80 m"
     #[arg(long, value_name = "LOW..HIGH,…", value_parser = Axis::parse, value_delimiter = ',', required = true, allow_hyphen_values = true)]
-    domain: Vec<Axis>,
+    pub(super) domain: Vec<Axis>,
     /// How many cells along each axis
     #[arg(long, value_name = "N,…", value_delimiter = ',', required = true)]
     cells: Vec<usize>,
     /// Columns of coordinates, one per axis [default: x, y, z as many as needed]
     #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
-    columns: Vec<String>,
+    pub(super) columns: Vec<String>,
     /// Column of weights, such as masses [default: all points weigh 1]
     #[arg(long, value_name = "NAME")]
-    weight: Option<String>,
+    pub(super) weight: Option<String>,
+    /// Take only rows that have this in a column, such as species=A or t=10; perhaps several times
+    #[arg(long = "where", value_name = "COLUMN=VALUE", value_parser = super::load::parse_setting)]
+    pub(super) conditions: Vec<(String, String)>,
     /// What both ends of each axis are: one word for all, or one per axis
     #[arg(long, value_name = "WORD,…", value_enum, value_delimiter = ',', default_value = "reflect")]
     ends: Vec<EndName>,
@@ -119,10 +121,10 @@ enum WeighingName {
 
 /// A range, and perhaps its unit.
 #[derive(Debug, Clone)]
-struct Axis {
+pub(super) struct Axis {
     low: f64,
     high: f64,
-    unit: Option<(String, Unit)>,
+    pub(super) unit: Option<(String, Unit)>,
 }
 
 impl Axis {
@@ -153,7 +155,7 @@ impl Axis {
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
     let start = Instant::now();
-    let points = read(arguments)?;
+    let points = Points::read(arguments)?;
     let lattice = lattice(arguments, &points)?;
     let low: Vec<f64> =
         arguments.domain.iter().zip(&points.factors).map(|(axis, factor)| axis.low * factor).collect();
@@ -228,63 +230,6 @@ fn spread(
     })
 }
 
-/// Numbers in SI where units are known, the weights last; the factors of coordinates and the units of all.
-struct Points {
-    hash: String,
-    names: Vec<String>,
-    factors: Vec<f64>,
-    units: Vec<String>,
-    numbers: Vec<Vec<f64>>,
-}
-
-fn read(arguments: &Arguments) -> Result<Points, Stopped> {
-    let d = arguments.domain.len();
-    let names: Vec<String> = match arguments.columns.len() {
-        0 => ["x", "y", "z"].into_iter().take(d).map(str::to_owned).collect(),
-        _ => arguments.columns.clone(),
-    };
-    if d > 3 || names.len() != d {
-        return Err(wrong("a domain has one to three axes, and as many columns"));
-    }
-    let bytes = read_data(&arguments.file)?;
-    let file = DataFile::new(arguments.file.display().to_string(), bytes);
-    let noted = file.units();
-    let unit_of = |name: &String, given: Option<&(String, Unit)>| -> (String, Unit) {
-        let noted = || noted.get(name).and_then(|text| Some((text.clone(), Unit::parse(text).ok()?)));
-        given.cloned().or_else(noted).unwrap_or((String::new(), Unit::ONE))
-    };
-    let mut units: Vec<(String, Unit)> =
-        names.iter().zip(&arguments.domain).map(|(name, axis)| unit_of(name, axis.unit.as_ref())).collect();
-    let mut wanted = names;
-    if let Some(weight) = &arguments.weight {
-        units.push(unit_of(weight, None));
-        wanted.push(weight.clone());
-    }
-    let columns: Vec<Column> = wanted
-        .iter()
-        .zip(&units)
-        .map(|(name, (_, unit))| Column { name: name.clone(), unit: *unit })
-        .collect();
-    let found = file.columns(&columns).map_err(|error| unreadable(&arguments.file, &error))?;
-    if let Some(row) = found.numbers.get(d).and_then(|own| own.iter().position(|weight| *weight < 0.0)) {
-        let error =
-            ReadError::new(lamella::data::Kind::Value, "a weight is below zero").at(found.places.of(row));
-        return Err(unreadable(&arguments.file, &error));
-    }
-    Ok(Points {
-        hash: file.hash.clone(),
-        factors: units[..d].iter().map(|(_, unit)| unit.factor()).collect(),
-        units: units.iter().map(|(text, unit)| si(text, unit)).collect(),
-        names: wanted,
-        numbers: found.numbers.clone(),
-    })
-}
-
-/// The name of what numbers are in.
-fn si(text: &str, unit: &Unit) -> String {
-    if text.is_empty() || text == "1" { String::new() } else { lamella::table::si_text(unit.dimension) }
-}
-
 fn lattice(arguments: &Arguments, points: &Points) -> Result<Lattice, Stopped> {
     let d = arguments.domain.len();
     if arguments.cells.len() != d {
@@ -353,6 +298,7 @@ fn tabulate(
         "lamella": env!("CARGO_PKG_VERSION"),
         "file": { "name": arguments.file.file_name().map(|name| name.to_string_lossy().into_owned()), "hash": points.hash },
         "columns": points.names,
+        "where": arguments.conditions,
         "exact": arguments.exact || arguments.parity,
         "parity": arguments.parity,
         "kernel": arguments.kernel.word(),
@@ -424,7 +370,7 @@ fn norm(values: &[f64]) -> f64 {
     values.iter().map(|value| value * value).sum::<f64>().sqrt()
 }
 
-fn wrong(message: &str) -> Stopped {
+pub(super) fn wrong(message: &str) -> Stopped {
     Stopped::new(
         Exit::SceneWrong,
         Diagnostic::error(codes::F101, message.to_owned()).help("see lamella density --help"),
@@ -433,22 +379,4 @@ fn wrong(message: &str) -> Stopped {
 
 fn failed(message: &str) -> Stopped {
     Stopped::new(Exit::Failed, Diagnostic::error(codes::F103, message.to_owned()))
-}
-
-fn unreadable(file: &Path, error: &ReadError) -> Stopped {
-    let place = match error.place {
-        None => String::new(),
-        Some(Place::Byte(at)) => format!(" (byte {at})"),
-        Some(Place::Text { line, column }) => format!(" (line {line}, column {column})"),
-        Some(Place::Row(row)) => format!(" (row {row})"),
-    };
-    let message = format!("cannot take points from {}: {}{place}", file.display(), error.message);
-    let message = Diagnostic::error(codes::F101, message);
-    Stopped::new(
-        Exit::SceneWrong,
-        match &error.help {
-            Some(help) => message.help(help.clone()),
-            None => message,
-        },
-    )
 }

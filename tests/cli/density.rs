@@ -95,6 +95,43 @@ fn points_have_units() {
     }
 }
 
+/// Particles of a run, of one species at one time; units are those that the table says.
+#[test]
+fn particles_of_a_run_have_a_density() {
+    let folder = Folder::new();
+    folder.write(
+        "two.lam",
+        "lamella 1\nspecies A, B\ndomain rect x = 0 .. 100 m, y = 0 .. 40 m\nmedium porosity 0.3\n\
+         flow velocity = (0.5 m/d, 0)\ndispersion longitudinal 0.5 m, transverse 0.1 m, molecular 0\n\
+         boundary left, right outflow\nboundary top, bottom reflect\n\
+         source one: A = 1 mol/m in box(20 .. 22 m, 18 .. 22 m)\n\
+         source two: B = 2 mol/m in box(40 .. 42 m, 18 .. 22 m)\n\
+         particles mass A 2_000, B 3_000\nrun to 40 d, step 1 d\noutput particles A, B at t = 20 d, 40 d\n",
+    );
+    folder.lamella(&["run", "two.lam", "--out", "r"]).exits(0);
+    let of = |domain: &str, more: &[&str]| {
+        let mut arguments = vec!["density", "r/particles/part-0000.parquet", "--out", "d.parquet"];
+        arguments.extend(["--domain", domain, "--cells", "100,40", "--weight", "concentration"]);
+        arguments.extend(more);
+        folder.lamella(&arguments)
+    };
+    let late = ["--where", "t=3456000", "--where"];
+    for (species, amount, centre) in [("species=A", 1.0, 41.0), ("species=B", 2.0, 61.0)] {
+        of("0..100 m, 0..40 m", &[&late[..], &[species]].concat()).exits(0);
+        let file = DataFile::new("d", std::fs::read(folder.path("d.parquet")).expect("the table"));
+        let wanted = ["x", "density"].map(|name| Column { name: name.to_owned(), unit: Unit::ONE });
+        let found = file.columns(&wanted).expect("columns");
+        let (x, density) = (&found.numbers[0], &found.numbers[1]);
+        let all: f64 = density.iter().sum();
+        assert!((all / amount - 1.0).abs() < 1e-9, "{species}: {all}");
+        let mean = x.iter().zip(density).map(|(x, density)| x * density).sum::<f64>() / all;
+        // Means of 2000 places that spread by 4.5 m.
+        assert!((mean - centre).abs() < 0.4, "{species}: {mean}");
+    }
+    of("0..100 m, 0..40 m", &["--where", "species=Q"]).exits(2).says("no row has all that --where asks for");
+    of("0..100 s, 0..40 m", &[]).exits(2).says("column `x` is in m, and --domain says s");
+}
+
 #[test]
 fn what_is_wrong_is_said_in_one_sentence() {
     let folder = Folder::new();
