@@ -366,6 +366,46 @@ fn bits_hang_neither_on_threads_nor_on_vectors() {
     }
 }
 
+/// A thin layer: what one axis is measured in changes nothing, and an axis of one cell is none.
+#[test]
+fn axes_have_lengths_of_their_own() {
+    let mut draws = Draws(11);
+    let x: Vec<f64> = (0..5000).map(|_| 40.0 + 5.0 * draws.normal()).collect();
+    let y: Vec<f64> = (0..5000).map(|_| 40.0 + 5.0 * draws.normal()).collect();
+    let of = |scale: f64| {
+        let lattice = Lattice::new(&[(80, 1.0, CLOSED), (80, scale, CLOSED)]).unwrap();
+        let y: Vec<f64> = y.iter().map(|y| scale * y).collect();
+        let tally = Tally::of(&lattice, &[0.0, 0.0], &[&x, &y], None);
+        estimate(&lattice, &tally, &Adaptive::default(), Width::widest())
+    };
+    let even = of(1.0);
+    for scale in [1e-3, 0.125, 1000.0] {
+        let found = of(scale);
+        for (own, expected) in
+            found.density.iter().zip(&even.density).filter(|(_, expected)| **expected > 1e-3)
+        {
+            assert!((own * scale / expected - 1.0).abs() < 1e-9, "{scale}: {own} for {expected}");
+        }
+        for (own, expected) in found.cells.iter().zip(&even.cells) {
+            let widths = |cell: &Cell| [cell.h * cell.s[1], cell.h * cell.s[2]];
+            let ([x, y], [same, other]) = (widths(own), widths(expected));
+            assert!((x / same - 1.0).abs() < 1e-9 && (y / scale / other - 1.0).abs() < 1e-9, "{scale}");
+        }
+    }
+    let line = line(0.0, 80.0, 1.0);
+    let tally = Tally::of(&line, &[0.0], &[&x], None);
+    let expected = estimate(&line, &tally, &Adaptive::default(), Width::widest());
+    for width in [1e-3, 1.0, 1e3] {
+        let lattice = Lattice::new(&[(80, 1.0, CLOSED), (1, width, CLOSED)]).unwrap();
+        let y = vec![0.5 * width; x.len()];
+        let tally = Tally::of(&lattice, &[0.0, 0.0], &[&x, &y], None);
+        let found = estimate(&lattice, &tally, &Adaptive::default(), Width::widest());
+        for (own, expected) in found.density.iter().zip(&expected.density) {
+            assert!((own * width - expected).abs() <= 1e-12 * expected, "{width}: {own} for {expected}");
+        }
+    }
+}
+
 /// Masses that are none, or below zero, make a density that is none.
 #[test]
 fn masses_that_are_none_make_no_density() {

@@ -155,6 +155,7 @@ impl Axis {
 
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
     let start = Instant::now();
+    check(arguments)?;
     let points = Points::read(arguments)?;
     let lattice = lattice(arguments, &points)?;
     let low: Vec<f64> =
@@ -185,6 +186,44 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
         .map_err(|error| Stopped::new(Exit::Failed, Diagnostic::error(codes::F103, error.to_string())))?;
     tell(terminal, &path, (&lattice, &tally, &found), (seconds, start.elapsed().as_secs_f64(), error))?;
     Ok(Exit::Done)
+}
+
+/// What contradicts itself, before anything is read.
+fn check(arguments: &Arguments) -> Result<(), Stopped> {
+    if arguments.out.extension().is_none_or(|extension| extension != "parquet") {
+        return Err(wrong("--out is a Parquet file: its name ends in .parquet"));
+    }
+    if arguments.tolerance.is_nan() || arguments.tolerance < 0.0 {
+        return Err(wrong("the tolerance is a number of zero or more"));
+    }
+    let differ = matches!(arguments.kernel, KernelName::Adaptive | KernelName::Round);
+    let idle = [
+        (arguments.exact, "--exact"),
+        (arguments.parity, "--parity"),
+        (arguments.bandwidth.is_some(), "--bandwidth"),
+    ];
+    if let Some((_, name)) = idle.iter().find(|(is_given, _)| *is_given && !differ) {
+        return Err(wrong(&format!("{name} is for kernels that differ from place to place")));
+    }
+    let Some(first) = arguments.domain.first() else { return Ok(()) };
+    let dimension = |axis: &Axis| axis.unit.as_ref().map(|(_, unit)| unit.dimension);
+    if arguments.domain.iter().any(|axis| dimension(axis) != dimension(first)) {
+        return Err(wrong("axes are lengths of one kind: all with units, or none"));
+    }
+    let of_bandwidth = arguments.bandwidth.as_ref().and_then(dimension);
+    if of_bandwidth.is_some() && of_bandwidth != dimension(first) {
+        return Err(wrong("--bandwidth has a unit that --domain has not"));
+    }
+    for (idx, name) in arguments.columns.iter().enumerate() {
+        if arguments.columns[..idx].contains(name) {
+            return Err(wrong(&format!("column `{name}` is there twice")));
+        }
+        let is_taken = ["density", "standard_error", "n_particles", "support"].contains(&name.as_str());
+        if is_taken || name.starts_with("bandwidth_") {
+            return Err(wrong(&format!("`{name}` is a column of the result: coordinates need other names")));
+        }
+    }
+    Ok(())
 }
 
 /// The density, as if kernels differed from cell to cell.
@@ -266,7 +305,10 @@ fn adaptive(arguments: &Arguments, factor: f64) -> Adaptive {
             WeighingName::Number => Weighing::Number,
             WeighingName::Cell => Weighing::OfCell,
         },
-        bounds: arguments.bandwidth.as_ref().map(|own| [own.low * factor, own.high * factor]),
+        bounds: arguments.bandwidth.as_ref().map(|own| {
+            let factor = own.unit.as_ref().map_or(factor, |(_, unit)| unit.factor());
+            [own.low * factor, own.high * factor]
+        }),
         is_fast: !(arguments.exact || arguments.parity),
         tolerance: arguments.tolerance,
         most_loops: arguments.loops as usize,
@@ -306,6 +348,9 @@ fn tabulate(
         "loops": found.history.len() - 1,
         "settled": found.is_settled,
         "mean_bandwidth": found.history.last(),
+        "weighing": arguments.weighing.to_possible_value().map(|value| value.get_name().to_owned()),
+        "ends": arguments.ends.iter().filter_map(|end| end.to_possible_value()).map(|end| end.get_name().to_owned()).collect::<Vec<String>>(),
+        "bandwidth_bounds": adaptive(arguments, points.factors[0]).bounds,
         "weight_inside": tally.mass(),
         "effective_points": tally.effective(),
         "points_outside": tally.outside.0,

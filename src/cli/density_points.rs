@@ -92,10 +92,12 @@ fn selected(arguments: &Arguments, file: &DataFile, numbers: &[Vec<f64>]) -> Res
         let number = value.trim().parse::<f64>().ok();
         let holds = number.map(|number| equals(file, name, number));
         let holds = match holds {
-            Some(Ok(holds)) => holds,
+            Some(Ok(holds)) => Ok(holds),
             // A word may look like a number.
-            _ => reads(file, name, value.trim()).map_err(|error| unreadable(&arguments.file, &error))?,
+            Some(Err(error)) => reads(file, name, value.trim()).map_err(|_| error),
+            None => reads(file, name, value.trim()),
         };
+        let holds = holds.map_err(|error| unreadable(&arguments.file, &error))?;
         is_wanted.iter_mut().zip(holds).for_each(|(all, own)| *all &= own);
     }
     if !is_wanted.contains(&true) {

@@ -129,7 +129,7 @@ fn particles_of_a_run_have_a_density() {
         assert!((mean - centre).abs() < 0.4, "{species}: {mean}");
     }
     of("0..100 m, 0..40 m", &["--where", "species=Q"]).exits(2).says("no row has all that --where asks for");
-    of("0..100 s, 0..40 m", &[]).exits(2).says("column `x` is in m, and --domain says s");
+    of("0..100 s, 0..40 s", &[]).exits(2).says("column `x` is in m, and --domain says s");
 }
 
 #[test]
@@ -138,7 +138,7 @@ fn what_is_wrong_is_said_in_one_sentence() {
     folder.write("points.csv", "x,y\n1,2\n3,oops\n");
     folder.write("heavy.csv", "x,m\n1,2\n3,-1\n");
     folder.write("far.csv", "x\n1000\n");
-    let cases: [(&[&str], i32, &str); 10] = [
+    let cases: [(&[&str], i32, &str); 16] = [
         (&["points.csv", "--domain", "0..1", "--cells", "4,4"], 2, "--cells has 2 numbers for 1 axes"),
         (&["points.csv", "--domain", "0..1,0..1", "--cells", "4,4"], 2, "line 3"),
         (&["points.csv", "--domain", "0..1", "--cells", "0"], 2, "1 to 100 million cells"),
@@ -156,8 +156,22 @@ fn what_is_wrong_is_said_in_one_sentence() {
             2,
             "no point with a weight lies within the domain",
         ),
+        (&["far.csv", "--domain", "0..9 m,0..9 s", "--cells", "4,4", "--columns", "x,x"], 2, "of one kind"),
+        (&["far.csv", "--domain", "0..9,0..9", "--cells", "4,4", "--columns", "x,x"], 2, "twice"),
+        (
+            &["far.csv", "--domain", "0..9", "--cells", "4", "--columns", "density"],
+            2,
+            "`density` is a column of the result",
+        ),
+        (&["far.csv", "--domain", "0..9 m", "--cells", "4", "--bandwidth", "1..2 s"], 2, "--bandwidth"),
+        (&["far.csv", "--domain", "0..9", "--cells", "4", "--kernel", "histogram", "--exact"], 2, "--exact"),
+        (&["far.csv", "--domain", "0..9", "--cells", "4", "--tolerance", "nan"], 2, "tolerance"),
         (&["nowhere.csv", "--domain", "0..9", "--cells", "4"], 2, "nowhere.csv"),
     ];
+    folder
+        .lamella(&["density", "far.csv", "--domain", "0..9", "--cells", "4", "--out", "far.csv"])
+        .exits(2)
+        .says("parquet");
     for (arguments, code, text) in &cases {
         let arguments = [&["density"], *arguments, &["--out", "density.parquet"]].concat();
         folder.lamella(&arguments).exits(*code).says(text);

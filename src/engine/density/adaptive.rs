@@ -6,14 +6,15 @@
 use super::super::parallel;
 use super::classes::{Fill, Table, bandwidth_of, class_of};
 use super::curvature::{Curvatures, curvatures};
+use super::frame::Frame;
+use super::global::histogram;
 use super::lattice::{AXES, Field, Lattice, Window};
 use super::limits::{GROWTH, Limits};
-use super::rough::{crossed, net_roughness};
 use super::smoothed::Smoothed;
 use super::stencil::scatter;
 use super::tally::{Tally, Weighing};
 use super::taps::{Integral, Line, REACH, Taps};
-use crate::maths::vector::{exp, ln, pow};
+use crate::maths::vector::{ln, pow};
 use crate::maths::wide::Width;
 use std::f64::consts::PI;
 
@@ -22,9 +23,6 @@ const PORTION: usize = 64;
 
 /// From this loop on the running mean of the error may end the iteration.
 const RUNNING: usize = 8;
-
-/// Where one direction has more of all roughness than this, the released code takes half of it for isotropic.
-const DOMINANT: f64 = 0.85;
 
 /// Which formulas are taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -133,24 +131,24 @@ impl Estimate {
     }
 }
 
-struct Search<'a> {
-    lattice: &'a Lattice,
-    adaptive: &'a Adaptive,
-    limits: Limits,
-    integral: Integral,
-    width: Width,
-    counts: Vec<f64>,
-    cells: Vec<Cell>,
+pub(super) struct Search<'a> {
+    pub(super) lattice: &'a Lattice,
+    pub(super) adaptive: &'a Adaptive,
+    pub(super) limits: Limits,
+    pub(super) integral: Integral,
+    pub(super) width: Width,
+    pub(super) counts: Vec<f64>,
+    pub(super) cells: Vec<Cell>,
     /// The density with their kernels.
-    rho: (Window, Field),
-    d: f64,
-    constants: Constants,
+    pub(super) rho: (Window, Field),
+    pub(super) d: f64,
+    pub(super) constants: Constants,
 }
 
 /// Logarithms of what hangs on nothing but the number of axes.
-struct Constants {
-    support: f64,
-    curvature: f64,
+pub(super) struct Constants {
+    pub(super) support: f64,
+    pub(super) curvature: f64,
 }
 
 impl Constants {
@@ -166,11 +164,39 @@ impl Constants {
 
 /// The density of particles that are counted on a lattice.
 pub fn estimate(lattice: &Lattice, tally: &Tally, adaptive: &Adaptive, width: Width) -> Estimate {
+    let takes_cells = adaptive.shape == Shape::Stretched && adaptive.variant == Variant::Corrected;
+    let frame = Frame::new(lattice, tally, takes_cells);
+    if frame.is_point() {
+        let (density, standard_error) = histogram(lattice, tally);
+        return Estimate { density, standard_error, cells: Vec::new(), history: vec![0.0], is_settled: true };
+    }
+    let (own_lattice, own_tally) = frame.reduced.as_ref().map_or((lattice, tally), |(own, of)| (own, of));
+    let start = match adaptive.start {
+        Start::Bandwidth(h) => Start::Bandwidth(h / frame.mean()),
+        other => other,
+    };
+    let own = Adaptive { start, ..adaptive.clone() };
+    let mut limits = Limits::new(own_lattice);
+    if let Some(bounds) = adaptive.bounds {
+        let axes = AXES - own_lattice.d..;
+        for (limit, scale) in limits.kernel[axes].iter_mut().zip(&frame.scales) {
+            *limit = bounds.map(|bound| (bound / scale).clamp(limit[0], limit[1]));
+        }
+    }
+    frame.restore(solve(own_lattice, own_tally, (&own, limits), width))
+}
+
+fn solve(
+    lattice: &Lattice,
+    tally: &Tally,
+    (adaptive, limits): (&Adaptive, Limits),
+    width: Width,
+) -> Estimate {
     let (counts, unit) = tally.pseudo_counts(adaptive.weighing);
     let mut search = Search {
         lattice,
         adaptive,
-        limits: Limits::new(lattice, adaptive.bounds),
+        limits,
         integral: Integral::new(),
         width,
         counts,
@@ -305,77 +331,6 @@ impl Search<'_> {
             }
         }
         most.map(|own| (REACH * own).ceil() as usize + 1)
-    }
-
-    /// `σ = [(d+2)(8π)^{d/2}/4]^{1/4} n^{1/2} h^{1+d/4} ρ^{−1/4}`, within its bounds.
-    fn widen(&self, cell: &mut Cell, n: f64) {
-        let d = self.d;
-        let logs = 0.5 * ln(n) + (1.0 + 0.25 * d) * ln(cell.h) - 0.25 * ln(cell.rho);
-        let [low, high] = self.limits.support;
-        cell.sigma = exp(self.constants.support + logs).min(GROWTH * cell.sigma).clamp(low, high);
-    }
-
-    /// Bandwidths of curvatures.
-    ///
-    /// - Equation: `g_i = α N_v^β h [1/((d+4) s_i⁴) Σ_j a_ij/s_j²]^{−1/(d+6)}`, `N_v = (√(8π) σ)^d n²/ρ`.
-    /// - Symbols: `a_ij` 5 for i = j, else 1; `α` and `β` as in the source.
-    /// - Range: within bounds.
-    /// - Source: methods, (4.3).
-    /// - Shape: one per axis, m.
-    fn choose_curvature(&self, cell: &mut Cell) {
-        let d = self.d;
-        let beta = 2.0 / ((d + 4.0) * (d + 6.0));
-        let virtual_n = d * ln((8.0 * PI).sqrt() * cell.sigma) + 2.0 * ln(cell.n) - ln(cell.rho);
-        let common = self.constants.curvature + beta * virtual_n + ln(cell.h);
-        let smallest = self.lattice.smallest();
-        let [low, high] = self.limits.curvature.map(ln);
-        for axis in self.lattice.axes() {
-            let of_other = |other: usize| {
-                let s = cell.s[other];
-                (if other == axis { 5.0 } else { 1.0 }) / (s * s)
-            };
-            let sum: f64 = self.lattice.axes().map(of_other).sum();
-            let square = cell.s[axis] * cell.s[axis];
-            let log = common - ln(sum / ((d + 4.0) * square * square)) / (d + 6.0);
-            let log = log.clamp(low, high);
-            cell.g_class[axis] = class_of(log - ln(smallest));
-            cell.g[axis] =
-                if self.adaptive.is_fast { smallest * bandwidth_of(cell.g_class[axis]) } else { exp(log) };
-        }
-    }
-
-    /// Size and shape of a kernel, from roughness: the triangle ψ_ij by rows.
-    fn choose(&self, cell: &mut Cell) {
-        let d = self.lattice.d;
-        let psi = cell.psi;
-        let psi = &psi[..d * (d + 1) / 2];
-        let own: Vec<f64> = (0..d).map(|i| psi[i * (i + 3) / 2]).collect();
-        let is_round = self.adaptive.shape == Shape::Round || own.iter().any(|&psi| psi <= 0.0);
-        let is_released = self.adaptive.variant == Variant::Released;
-        let round = own.iter().sum::<f64>() + 2.0 * crossed(psi, d);
-        let mut roughness = if is_round { round } else { net_roughness(psi, &own, is_released) };
-        let all: f64 = own.iter().sum();
-        if is_released && own.iter().any(|own| own / all > DOMINANT) {
-            roughness = 0.5 * roughness + 0.5 * all;
-        }
-        cell.roughness = roughness.max(0.0);
-        cell.h = if cell.roughness > 0.0 {
-            pow(self.d * cell.n / (pow(4.0 * PI, 0.5 * self.d) * cell.roughness), 1.0 / (self.d + 4.0))
-        } else {
-            0.0
-        };
-        let mean: f64 = own.iter().product();
-        let mut others = 1.0;
-        for axis in self.lattice.axes() {
-            let psi = own[axis + d - AXES];
-            cell.s[axis] = match (is_round || d == 1, is_released) {
-                (true, _) => 1.0,
-                (_, true) if axis + 1 == AXES => 1.0 / others,
-                (_, true) => pow(roughness / psi, 0.25 / self.d),
-                (_, false) => pow(psi, -0.25) * pow(mean, 0.25 / self.d),
-            };
-            others *= cell.s[axis];
-        }
     }
 
     /// Where nothing is rough kernels are as wide as the widest, and all are brought within their bounds.

@@ -8,9 +8,6 @@ use super::lattice::{AXES, End, Field};
 use super::taps::{Integral, Line, REACH, Taps};
 use crate::maths::wide::Width;
 
-/// Cells near an end that have taps of their own, at most: these are as many each.
-const MOST_OWN: usize = 2048;
-
 /// What each cell of an axis takes of its neighbours.
 #[derive(Debug, Clone, Default)]
 pub struct Band {
@@ -33,8 +30,7 @@ impl Band {
     }
 
     /// What cells of a level take, none from farther than a reach: `fill` knows it of each cell. Where kernels and their
-    /// images are not just added, as where they are squared, cells near an end have taps of their own, as long as these are not
-    /// too many.
+    /// images are not just added, as where they are squared, cells near an end have taps of their own.
     pub fn of((line, reach): (Line, usize), is_sum: bool, fill: &dyn Fn(Line, usize, &mut Taps)) -> Self {
         let n = line.n.div_ceil(line.factor);
         let of_cell = |line: Line, cell: usize| {
@@ -48,7 +44,7 @@ impl Band {
         let reach = reach - first.min(reach);
         values.truncate(2 * reach + 1);
         // Fine cells beyond an end are those that it mirrors. Coarse ones are not, where the last one is narrower.
-        let is_folded = is_long && line.factor == 1 && (is_sum || reach > MOST_OWN);
+        let is_folded = is_long && line.factor == 1 && is_sum;
         let n_ends = if is_folded { 0 } else { (reach + 1).min(n) };
         let ends = [0, 1]
             .map(|end| (0..n_ends).map(|k| of_cell(line, if end == 0 { k } else { n - 1 - k })).collect());

@@ -5,6 +5,7 @@
 
 use super::adaptive::Shape;
 use super::bands::{Band, smooth};
+use super::frame::Frame;
 use super::lattice::{AXES, Field, Lattice, Window};
 use super::limits::Limits;
 use super::spectrum::Spectrum;
@@ -27,6 +28,9 @@ const STAGES: [i32; 6] = [7, 6, 5, 4, 3, 2];
 const WIDEST: f64 = 0.1;
 const FACTOR: f64 = 1.2;
 const N_BISECTIONS: usize = 60;
+
+/// Cells that a kernel may reach to each side; more would take long, and show nothing.
+const MOST_REACH: f64 = 2000.0;
 
 /// How the bandwidth is found.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,6 +56,8 @@ pub enum Trouble {
     Masses,
     /// Particles were counted on other cells.
     OtherCells,
+    /// Kernels reach too many cells.
+    TooFine,
 }
 
 impl std::fmt::Display for Trouble {
@@ -60,6 +66,9 @@ impl std::fmt::Display for Trouble {
             Self::Bandwidth => "the bandwidth is not a number above zero",
             Self::OnlyOnALine => "this rule finds a bandwidth on a line, not in a plane or in space",
             Self::Masses => "masses of particles, or their sums, are not finite",
+            Self::TooFine => {
+                "cells are so fine that a kernel reaches more than two thousand: fewer cells show as much"
+            }
             Self::OtherCells => "particles were counted on another lattice",
         })
     }
@@ -96,6 +105,18 @@ pub fn global(
     width: Width,
 ) -> Result<Global, Trouble> {
     check(lattice, tally)?;
+    let frame = Frame::new(lattice, tally, false);
+    if let Some((own, of)) = &frame.reduced {
+        // An axis of one cell tells nothing of a density.
+        let mut found = global(own, of, rule, weighing, width)?;
+        let values = found.density.iter_mut().chain(&mut found.standard_error);
+        values.for_each(|value| *value *= frame.per_volume());
+        let mut bandwidths = [0.0; AXES];
+        for (k, &axis) in frame.kept.iter().enumerate() {
+            bandwidths[axis] = found.bandwidths[AXES - own.d + k];
+        }
+        return Ok(Global { bandwidths, ..found });
+    }
     let search = Search::new(lattice, tally, weighing);
     let found = match rule {
         Rule::Fixed(h) if h > 0.0 && h.is_finite() => Found::at_once(search.limited([h; AXES])),
@@ -106,6 +127,10 @@ pub fn global(
         Rule::PlugIn(shape) => search.plug_in(tally, shape),
     };
     let Found { bandwidths, n_loops, is_settled } = found;
+    let is_wide = |axis: usize| REACH * bandwidths[axis] / lattice.edge[axis] > MOST_REACH;
+    if lattice.axes().any(is_wide) {
+        return Err(Trouble::TooFine);
+    }
     let volume = lattice.volume();
     let mut density = spread(lattice, (&tally.cells, &tally.masses), (bandwidths, false), width);
     density.iter_mut().for_each(|value| *value /= volume);
@@ -172,7 +197,7 @@ impl<'a> Search<'a> {
             counts.fill(0.0);
         }
         let n: f64 = counts.iter().sum();
-        Self { lattice, limits: Limits::new(lattice, None), counts, n }
+        Self { lattice, limits: Limits::new(lattice), counts, n }
     }
 
     /// Bandwidths within their bounds; those that are no number are as wide as can be.

@@ -27,7 +27,7 @@ impl Limits {
     /// - Range: axes of at least four cells; on shorter ones the lower bound holds.
     /// - Source: methods, section 4.6.
     /// - Shape: lower and upper bounds, m.
-    pub fn new(lattice: &Lattice, own: Option<[f64; 2]>) -> Self {
+    pub fn new(lattice: &Lattice) -> Self {
         let mut limits = Self {
             kernel: [[0.0, f64::INFINITY]; AXES],
             curvature: [0.0, f64::INFINITY],
@@ -42,10 +42,7 @@ impl Limits {
             limits.support[1] = limits.support[1].min(high);
             limits.curvature[0] = limits.curvature[0].max(0.3 * edge);
             limits.curvature[1] = limits.curvature[1].min((most / CURVATURE_REACH).max(0.3 * edge));
-            limits.kernel[axis] = match own {
-                Some([least, largest]) => [least.clamp(low, high), largest.clamp(low, high)],
-                None => [low, high],
-            };
+            limits.kernel[axis] = [low, high];
         }
         limits.support[1] = limits.support[1].max(limits.support[0]);
         limits.curvature[1] = limits.curvature[1].max(limits.curvature[0]);

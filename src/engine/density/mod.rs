@@ -5,9 +5,11 @@
 
 mod adaptive;
 mod bands;
+mod choice;
 mod classes;
 mod curvature;
 mod direct;
+mod frame;
 mod global;
 mod ladder;
 pub mod lattice;

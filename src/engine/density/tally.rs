@@ -86,6 +86,16 @@ impl Tally {
         tally
     }
 
+    /// The same of some axes alone, the last ones then, with other lengths for one.
+    pub fn along(&self, kept: &[usize], scales: &[f64]) -> Self {
+        let mut moments = [[0.0; 2]; AXES];
+        for ((own, &axis), scale) in moments[AXES - kept.len()..].iter_mut().zip(kept).zip(scales) {
+            let [first, second] = self.moments[axis];
+            *own = [first / scale, second / (scale * scale)];
+        }
+        Self { moments, ..self.clone() }
+    }
+
     pub fn mass(&self) -> f64 {
         self.masses.iter().sum()
     }

@@ -1,0 +1,87 @@
+//! Sizes and shapes of kernels, from what is known of a cell.
+//!
+//! Owns these formulas. May use roughness and classes. It deliberately sums nothing.
+
+use super::adaptive::{Cell, Search, Shape, Variant};
+use super::classes::{bandwidth_of, class_of};
+use super::lattice::AXES;
+use super::limits::GROWTH;
+use super::rough::{crossed, net_roughness};
+use crate::maths::vector::{exp, ln, pow};
+use std::f64::consts::PI;
+
+/// Where one direction has more of all roughness than this, the released code takes half of it for isotropic.
+const DOMINANT: f64 = 0.85;
+
+impl Search<'_> {
+    /// `σ = [(d+2)(8π)^{d/2}/4]^{1/4} n^{1/2} h^{1+d/4} ρ^{−1/4}`, within its bounds.
+    pub(super) fn widen(&self, cell: &mut Cell, n: f64) {
+        let d = self.d;
+        let logs = 0.5 * ln(n) + (1.0 + 0.25 * d) * ln(cell.h) - 0.25 * ln(cell.rho);
+        let [low, high] = self.limits.support;
+        cell.sigma = exp(self.constants.support + logs).min(GROWTH * cell.sigma).clamp(low, high);
+    }
+
+    /// Bandwidths of curvatures.
+    ///
+    /// - Equation: `g_i = α N_v^β h [1/((d+4) s_i⁴) Σ_j a_ij/s_j²]^{−1/(d+6)}`, `N_v = (√(8π) σ)^d n²/ρ`.
+    /// - Symbols: `a_ij` 5 for i = j, else 1; `α` and `β` as in the source.
+    /// - Range: within bounds.
+    /// - Source: methods, (4.3).
+    /// - Shape: one per axis, m.
+    pub(super) fn choose_curvature(&self, cell: &mut Cell) {
+        let d = self.d;
+        let beta = 2.0 / ((d + 4.0) * (d + 6.0));
+        let virtual_n = d * ln((8.0 * PI).sqrt() * cell.sigma) + 2.0 * ln(cell.n) - ln(cell.rho);
+        let common = self.constants.curvature + beta * virtual_n + ln(cell.h);
+        let smallest = self.lattice.smallest();
+        let [low, high] = self.limits.curvature.map(ln);
+        for axis in self.lattice.axes() {
+            let of_other = |other: usize| {
+                let s = cell.s[other];
+                (if other == axis { 5.0 } else { 1.0 }) / (s * s)
+            };
+            let sum: f64 = self.lattice.axes().map(of_other).sum();
+            let square = cell.s[axis] * cell.s[axis];
+            let log = common - ln(sum / ((d + 4.0) * square * square)) / (d + 6.0);
+            let log = log.clamp(low, high);
+            cell.g_class[axis] = class_of(log - ln(smallest));
+            cell.g[axis] =
+                if self.adaptive.is_fast { smallest * bandwidth_of(cell.g_class[axis]) } else { exp(log) };
+        }
+    }
+
+    /// Size and shape of a kernel, from roughness: the triangle ψ_ij by rows.
+    pub(super) fn choose(&self, cell: &mut Cell) {
+        let d = self.lattice.d;
+        let psi = cell.psi;
+        let psi = &psi[..d * (d + 1) / 2];
+        let own: Vec<f64> = (0..d).map(|i| psi[i * (i + 3) / 2]).collect();
+        let is_round = self.adaptive.shape == Shape::Round || own.iter().any(|&psi| psi <= 0.0);
+        let is_released = self.adaptive.variant == Variant::Released;
+        let round = own.iter().sum::<f64>() + 2.0 * crossed(psi, d);
+        let mut roughness = if is_round { round } else { net_roughness(psi, &own, is_released) };
+        let all: f64 = own.iter().sum();
+        if is_released && own.iter().any(|own| own / all > DOMINANT) {
+            roughness = 0.5 * roughness + 0.5 * all;
+        }
+        cell.roughness = roughness.max(0.0);
+        cell.h = if cell.roughness > 0.0 {
+            pow(self.d * cell.n / (pow(4.0 * PI, 0.5 * self.d) * cell.roughness), 1.0 / (self.d + 4.0))
+        } else {
+            0.0
+        };
+        let mean: f64 = own.iter().product();
+        let mut others = 1.0;
+        for axis in self.lattice.axes() {
+            let psi = own[axis + d - AXES];
+            cell.s[axis] = match (is_round || d == 1, is_released) {
+                (true, _) => 1.0,
+                (_, true) if axis + 1 == AXES => 1.0 / others,
+                (_, true) => pow(roughness / psi, 0.25 / self.d),
+                (_, false) => pow(psi, -0.25) * pow(mean, 0.25 / self.d),
+            };
+            others *= cell.s[axis];
+        }
+    }
+}
