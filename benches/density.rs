@@ -3,30 +3,16 @@
 
 #![allow(clippy::print_stdout)] // What a bench is for.
 
+#[path = "../tests/support/draws.rs"]
+mod draws;
+
+use draws::Draws;
 use lamella::engine::density::{
     Adaptive, End, Lattice, Rule, Shape, Tally, Weighing, estimate, global, histogram,
 };
-use lamella::maths::scalar::{cos, ln, sin};
+use lamella::maths::scalar::sin;
 use lamella::maths::wide::Width;
-use std::f64::consts::PI;
 use std::time::Instant;
-
-/// Numbers that look random: Steele and others 2014, SplitMix64.
-struct Draws(u64);
-
-impl Draws {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn normal(&mut self) -> f64 {
-        (-2.0 * ln(1.0 - self.uniform())).sqrt() * cos(2.0 * PI * self.uniform())
-    }
-}
 
 /// A third of the particles is spread more widely, and the cloud is bent.
 fn cloud(n: usize, cells: &[usize], deviations: &[f64]) -> (Lattice, Tally) {

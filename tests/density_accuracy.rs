@@ -2,32 +2,14 @@
 //!
 //! Tables: methods 10.2 and 10.3, of other programs and other samples; tolerances follow from the scatter between samples.
 
+#[path = "support/draws.rs"]
+mod draws;
+
+use draws::Draws;
 use lamella::engine::density::*;
-use lamella::maths::scalar::{cos, exp, ln};
+use lamella::maths::scalar::exp;
 use lamella::maths::wide::Width;
 use std::f64::consts::PI;
-
-/// Numbers that look random: Steele and others 2014, SplitMix64.
-struct Draws(u64);
-
-impl Draws {
-    fn uniform(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * ln(1.0 - self.uniform())).sqrt();
-        radius * cos(2.0 * PI * self.uniform())
-    }
-
-    fn normals(&mut self, n: usize) -> Vec<f64> {
-        (0..n).map(|_| self.normal()).collect()
-    }
-}
 
 fn bell(x: f64, deviation: f64) -> f64 {
     exp(-0.5 * (x / deviation) * (x / deviation)) / (deviation * (2.0 * PI).sqrt())

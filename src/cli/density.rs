@@ -181,10 +181,17 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
     }?;
     let seconds = estimated.elapsed().as_secs_f64();
     let error = norm(&found.standard_error) / norm(&found.density);
+    let kept = found.density.iter().sum::<f64>() * lattice.volume() / tally.mass();
     let table = tabulate(arguments, &points, (&lattice, &low), (&tally, &mut found));
     let path = write_density(&arguments.out, &table)
         .map_err(|error| Stopped::new(Exit::Failed, Diagnostic::error(codes::F103, error.to_string())))?;
-    tell(terminal, &path, (&lattice, &tally, &found), (seconds, start.elapsed().as_secs_f64(), error))?;
+    tell(
+        terminal,
+        &path,
+        (&lattice, &tally, &found),
+        (seconds, start.elapsed().as_secs_f64()),
+        (error, kept),
+    )?;
     Ok(Exit::Done)
 }
 
@@ -371,7 +378,8 @@ fn tell(
     terminal: &Terminal,
     path: &Path,
     (lattice, tally, found): (&Lattice, &Tally, &Estimate),
-    (seconds, all, error): (f64, f64, f64),
+    (seconds, all): (f64, f64),
+    (error, kept): (f64, f64),
 ) -> Result<(), Stopped> {
     let n: f64 = tally.counts.iter().sum();
     let (loops, mean) = (found.history.len() - 1, found.history.last().copied().unwrap_or(0.0));
@@ -379,7 +387,7 @@ fn tell(
         let text = serde_json::json!({
             "file": path.display().to_string(), "points": n, "points_outside": tally.outside.0,
             "cells": lattice.n_cells(), "cells_with_points": tally.cells.len(), "loops": loops,
-            "settled": found.is_settled, "mean_bandwidth": mean, "relative_standard_error": error,
+            "settled": found.is_settled, "mean_bandwidth": mean, "relative_standard_error": error, "weight_kept": kept,
             "seconds_estimate": seconds, "seconds": all,
         });
         return terminal.product(&format!("{text}\n"));
@@ -393,6 +401,15 @@ fn tell(
     };
     let state =
         if found.is_settled { "settled" } else { "not settled: more --loops, or a larger --tolerance" };
+    let outside = match kept {
+        kept if kept < 1.0 - 1e-6 => {
+            format!(
+                "{outside}; {} % of the weight is beyond ends that absorb",
+                significant(100.0 * (1.0 - kept), 2)
+            )
+        }
+        _ => outside,
+    };
     let kernels = match (found.cells.is_empty(), loops) {
         (true, _) => "none".to_owned(),
         (_, 0) => format!("bandwidth {}", significant(mean, 3)),

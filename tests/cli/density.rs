@@ -78,6 +78,20 @@ fn there_are_other_kernels() {
     }
 }
 
+/// Where nothing stays, what is beyond the ends is told.
+#[test]
+fn what_ends_absorb_is_told() {
+    let folder = Folder::new();
+    folder.write("points.csv", points(500));
+    let of = |ends: &str| {
+        let mut arguments = vec!["density", "points.csv", "--out", "d.parquet", "--ends", ends];
+        arguments.extend(["--domain", "48..100, 0..40", "--cells", "104,80"]);
+        folder.lamella(&arguments).exits(0)
+    };
+    of("absorb").gives("% of the weight is beyond ends that absorb");
+    of("reflect").gives("settled").gives("outside of the domain are left out");
+}
+
 /// A table of ours says its units; a scene's particles are points of a density.
 #[test]
 fn points_have_units() {
