@@ -284,10 +284,10 @@ fn effective_counts_of_cells_serve_unequal_masses() {
 }
 
 /// Fine and coarse, wide and narrow clouds in a box, stretched cells.
-fn cloud(d: usize, n: usize) -> (Lattice, Tally) {
+fn cloud(d: usize, n: usize, ends: [End; 2]) -> (Lattice, Tally) {
     let cells = [[400, 1, 1], [90, 70, 1], [50, 40, 30]][d - 1];
     let edges = [0.5, 1.0, 0.7];
-    let axes: Vec<(usize, f64, [End; 2])> = (0..d).map(|axis| (cells[axis], edges[axis], CLOSED)).collect();
+    let axes: Vec<(usize, f64, [End; 2])> = (0..d).map(|axis| (cells[axis], edges[axis], ends)).collect();
     let lattice = Lattice::new(&axes).unwrap();
     let mut draws = Draws(n as u64);
     let mut positions = vec![Vec::new(); d];
@@ -307,8 +307,17 @@ fn cloud(d: usize, n: usize) -> (Lattice, Tally) {
 /// Wide kernels are summed on coarse cells and bandwidths rounded. A fifth of what a density scatters by would add 2 % to it.
 #[test]
 fn short_cuts_are_far_below_the_error_by_particles() {
-    for (d, n) in [(1, 3_000), (1, 100_000), (2, 20_000), (3, 20_000)] {
-        let (lattice, tally) = cloud(d, n);
+    const RING: [End; 2] = [End::Wrap; 2];
+    let cases = [
+        (1, 3_000, CLOSED),
+        (1, 100_000, CLOSED),
+        (1, 20_000, RING),
+        (2, 20_000, CLOSED),
+        (2, 20_000, RING),
+        (3, 20_000, CLOSED),
+    ];
+    for (d, n, ends) in cases {
+        let (lattice, tally) = cloud(d, n, ends);
         let of = |is_fast: bool| {
             let adaptive = Adaptive { is_fast, tolerance: 0.0, most_loops: 8, ..Adaptive::default() };
             estimate(&lattice, &tally, &adaptive, Width::widest())
@@ -318,7 +327,7 @@ fn short_cuts_are_far_below_the_error_by_particles() {
             |values: &mut dyn Iterator<Item = f64>| values.map(|value| value * value).sum::<f64>().sqrt();
         let difference = norm(&mut fast.density.iter().zip(&exact.density).map(|(own, other)| own - other));
         let by_particles = norm(&mut exact.standard_error.iter().copied());
-        assert!(difference < 0.2 * by_particles, "{d}-D, {n}: {difference}, {by_particles}");
+        assert!(difference < 0.2 * by_particles, "{d}-D, {n}, {ends:?}: {difference}, {by_particles}");
         let total: f64 = fast.density.iter().sum::<f64>() * lattice.volume();
         assert!((total / tally.mass() - 1.0).abs() < 1e-12, "{d}-D: {total}");
     }
@@ -328,7 +337,7 @@ fn short_cuts_are_far_below_the_error_by_particles() {
 #[test]
 fn bits_hang_neither_on_threads_nor_on_vectors() {
     for d in 1..=3 {
-        let (lattice, tally) = cloud(d, 5_000);
+        let (lattice, tally) = cloud(d, 5_000, CLOSED);
         for is_fast in [true, false] {
             let bits = |threads: usize, width: Width| -> Vec<u64> {
                 let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

@@ -34,7 +34,7 @@ pub struct Ladder {
 }
 
 /// What a cell reads of a ladder.
-type Nodes = [(usize, [f64; 3]); AXES];
+type Nodes = [([usize; 3], [f64; 3]); AXES];
 
 impl Ladder {
     /// A field on fine cells of a window, smoothed by widths that enclose a range, m.
@@ -132,31 +132,38 @@ impl Rung {
         let mut nodes = Nodes::default();
         for axis in 0..AXES {
             let (factor, n, first) = (self.factors[axis], self.field.cells[axis], self.field.first[axis]);
-            let own = cell[axis] / factor - first;
+            // Factors are powers of two.
+            let own = (cell[axis] >> factor.trailing_zeros()) - first;
             if factor == 1 {
-                nodes[axis] = (own, [1.0, 0.0, 0.0]);
+                nodes[axis] = ([own; 3], [1.0, 0.0, 0.0]);
                 continue;
             }
             let u = (cell[axis] as f64 + 0.5) / factor as f64 - (own + first) as f64 - 0.5;
             let spline = [0.5 * (0.5 - u) * (0.5 - u), 0.75 - u * u, 0.5 * (0.5 + u) * (0.5 + u)];
-            let low = own.saturating_sub(1);
-            let mut weights = [0.0; 3];
+            if own > 0 && own + 1 < n {
+                nodes[axis] = ([own - 1, own, own + 1], spline);
+                continue;
+            }
             let n_all = lattice.cells[axis].div_ceil(factor);
+            let (places, weights) = &mut nodes[axis];
+            *places = [own; 3];
             for (k, weight) in spline.into_iter().enumerate() {
-                let at = (own + k).checked_sub(1).filter(|&at| at < n);
-                let is_end = [own + first == 0, own + first + 1 == n_all];
-                match at {
-                    Some(at) => weights[at - low] += weight,
-                    // Of windows that end before the domain does nothing is beyond.
-                    None if is_end[usize::from(k == 2)]
-                        && lattice.ends[axis][usize::from(k == 2)] != End::Sink =>
-                    {
-                        weights[own - low] += weight;
+                // Counted from one, as the first may stand before the beginning.
+                let after = own + first + k;
+                let (at, sign) = match (after, lattice.ends[axis]) {
+                    (0, [End::Wrap, _]) => (n_all - 1, 1.0),
+                    (0, [end, _]) => (0, if end == End::Sink { -1.0 } else { 1.0 }),
+                    (after, [_, End::Wrap]) if after > n_all => (0, 1.0),
+                    (after, [_, end]) if after > n_all => {
+                        (n_all - 1, if end == End::Sink { -1.0 } else { 1.0 })
                     }
-                    None => {}
+                    _ => (after - 1, 1.0),
+                };
+                // Of windows that end before the domain does nothing is beyond.
+                if at >= first && at < first + n {
+                    (places[k], weights[k]) = (at - first, sign * weight);
                 }
             }
-            nodes[axis] = (low, weights);
         }
         nodes
     }
@@ -164,17 +171,21 @@ impl Rung {
 
 #[inline(always)]
 fn read(field: &Field, nodes: &Nodes) -> f64 {
+    let [(x, of_planes), (y, of_rows), (z, taps)] = *nodes;
     let mut sum = 0.0;
-    for (x, of_plane) in (nodes[0].0..).zip(nodes[0].1) {
-        for (y, of_row) in (nodes[1].0..).zip(nodes[1].1) {
+    for (plane, of_plane) in x.into_iter().zip(of_planes) {
+        // Axes that are not used, or fine, have the first alone.
+        if of_plane == 0.0 {
+            continue;
+        }
+        for (row, of_row) in y.into_iter().zip(of_rows) {
             let weight = of_plane * of_row;
             if weight == 0.0 {
                 continue;
             }
-            let start = (x * field.cells[1] + y) * field.cells[2] + nodes[2].0;
-            for (value, tap) in field.values[start..start + 3].iter().zip(&nodes[2].1) {
-                sum += weight * tap * value;
-            }
+            let start = (plane * field.cells[1] + row) * field.cells[2];
+            let at = |k: usize| taps[k] * field.values[start + z[k]];
+            sum += weight * (at(0) + at(1) + at(2));
         }
     }
     sum
