@@ -340,7 +340,6 @@ fn tabulate(
         n_particles: count as u64,
         bandwidth: lattice.axes().map(|axis| cell.h * cell.s[axis]).filter(|h| *h > 0.0).collect(),
         support: cell.sigma,
-        roughness: cell.roughness,
     });
     let notes = serde_json::json!({
         "version": 1,

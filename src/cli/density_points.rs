@@ -5,7 +5,7 @@
 use super::density::{Arguments, wrong};
 use super::files::read_data;
 use super::{Exit, Stopped};
-use lamella::data::{Column, DataFile, Kind, MAX_NUMBERS, Place, ReadError, parquet};
+use lamella::data::{Column, DataFile, Kind, MAX_NUMBERS, Place, ReadError, columns, parquet};
 use lamella::diagnostic::{Diagnostic, codes};
 use lamella::units::Unit;
 use std::path::Path;
@@ -56,12 +56,13 @@ impl Points {
             units.push(unit_of(weight, None));
             wanted.push(weight.clone());
         }
-        let columns: Vec<Column> = wanted
+        let declared: Vec<Column> = wanted
             .iter()
             .zip(&units)
             .map(|(name, (_, unit))| Column { name: name.clone(), unit: *unit })
             .collect();
-        let found = file.columns(&columns).map_err(|error| unreadable(&arguments.file, &error))?;
+        let found =
+            columns::read(&file.bytes, &declared).map_err(|error| unreadable(&arguments.file, &error))?;
         if let Some(row) = found.numbers.get(d).and_then(|own| own.iter().position(|weight| *weight < 0.0)) {
             let error =
                 ReadError::new(lamella::data::Kind::Value, "a weight is below zero").at(found.places.of(row));
@@ -72,7 +73,7 @@ impl Points {
             factors: units[..d].iter().map(|(_, unit)| unit.factor()).collect(),
             units: units.iter().map(|(text, unit)| si(text, unit)).collect(),
             names: wanted,
-            numbers: selected(arguments, &file, &found.numbers)?,
+            numbers: selected(arguments, &file, found.numbers)?,
         })
     }
 }
@@ -83,9 +84,13 @@ fn si(text: &str, unit: &Unit) -> String {
 }
 
 /// The rows of which all conditions hold.
-fn selected(arguments: &Arguments, file: &DataFile, numbers: &[Vec<f64>]) -> Result<Vec<Vec<f64>>, Stopped> {
+fn selected(
+    arguments: &Arguments,
+    file: &DataFile,
+    numbers: Vec<Vec<f64>>,
+) -> Result<Vec<Vec<f64>>, Stopped> {
     if arguments.conditions.is_empty() {
-        return Ok(numbers.to_vec());
+        return Ok(numbers);
     }
     let mut is_wanted = vec![true; numbers.first().map_or(0, Vec::len)];
     for (name, value) in &arguments.conditions {

@@ -24,7 +24,6 @@ pub struct DensityCell {
     /// By axis.
     pub bandwidth: Vec<f64>,
     pub support: f64,
-    pub roughness: f64,
 }
 
 /// A density on cells of one size; the last axis runs fastest.

@@ -376,7 +376,7 @@ impl Search<'_> {
             let cell = &self.cells[idx];
             spread.weight = counts[idx] / if is_squared { volume * volume } else { volume };
             for (axis, lent) in spread.taps[0].iter_mut().enumerate() {
-                let line = Line { n: lattice.cells[axis], factor: 1, ends: lattice.ends[axis] };
+                let line = Line::of(lattice, axis, 1);
                 if axis + lattice.d < AXES {
                     lent.own.be_one();
                     continue;

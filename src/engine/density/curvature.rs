@@ -139,7 +139,7 @@ impl<'a> Kernels<'a> {
         let lattice = self.lattice;
         taps[..AXES - lattice.d].iter_mut().for_each(|lent| lent.own.be_one());
         for axis in lattice.axes() {
-            let line = Line { n: lattice.cells[axis], factor: 1, ends: lattice.ends[axis] };
+            let line = Line::of(lattice, axis, 1);
             let (own, b) = (cell.g[along] / lattice.edge[axis], cell.at[axis]);
             let fill: Fill = &|line, own, b, taps| self.work_out((along, axis), (line, own), b, taps);
             match &self.tables[along][axis] {
@@ -190,7 +190,7 @@ fn cascade(
         }
         let square = bandwidths[step] * bandwidths[step] - bandwidths[step - 1] * bandwidths[step - 1];
         for axis in lattice.axes() {
-            let line = Line { n: lattice.cells[axis], factor: 1, ends: lattice.ends[axis] };
+            let line = Line::of(lattice, axis, 1);
             // A Gaussian integrated over cells is wider by a twelfth.
             let own = square / (lattice.edge[axis] * lattice.edge[axis]);
             let deviation = ((own - 1.0 / 12.0).max(0.5 * own) / CUT).sqrt();
@@ -253,7 +253,7 @@ impl Factors {
     /// All of them; kernels are even, so that what a cell gives is what it takes.
     fn band(&self, lattice: &Lattice, axis: usize) -> Band {
         let edge = lattice.edge[axis];
-        let line = Line { n: lattice.cells[axis], factor: 1, ends: lattice.ends[axis] };
+        let line = Line::of(lattice, axis, 1);
         let reach = (CURVATURE_REACH * self.g / edge).ceil() as usize + 1;
         Band::of((line, reach), true, &|line, b, taps| self.fill(line, (axis, edge), b, taps))
     }

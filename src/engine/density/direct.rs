@@ -21,7 +21,7 @@ pub fn sums(
             taps[axis].be_one();
             continue;
         }
-        let line = Line { n: lattice.cells[axis], factor: 1, ends: lattice.ends[axis] };
+        let line = Line::of(lattice, axis, 1);
         let own = deviation / lattice.edge[axis];
         line.gaussian(integral, cell[axis], (own, own), &mut taps[axis]);
         taps[axis].cut(fields[0], axis);

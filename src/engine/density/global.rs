@@ -382,7 +382,7 @@ fn spread(
     for axis in lattice.axes() {
         // On one cell there is nowhere to go.
         if lattice.cells[axis] > 1 {
-            let line = Line { n: lattice.cells[axis], factor: 1, ends: lattice.ends[axis] };
+            let line = Line::of(lattice, axis, 1);
             let band = band(line, bandwidths[axis] / lattice.edge[axis], is_squared);
             smooth(&mut field, axis, &band, width);
         }

@@ -115,7 +115,7 @@ fn band(lattice: &Lattice, integral: Integral, (axis, factor): (usize, usize), d
     let square = (factor * factor) as f64;
     let widened = if factor == 1 { 0.0 } else { (square - 1.0) / 6.0 + 0.25 * square };
     let variance = (own * own - widened).max(0.25 * own * own);
-    let line = Line { n: lattice.cells[axis], factor, ends: lattice.ends[axis] };
+    let line = Line::of(lattice, axis, factor);
     Band::gaussian(line, integral, (variance.sqrt(), own))
 }
 

@@ -3,7 +3,7 @@
 //! Owns Gaussians integrated over cells, their second derivatives, and what ends do with them. May use the fixed maths. It
 //! deliberately knows no density: kernels in a plane or in space are products of these.
 
-use super::lattice::End;
+use super::lattice::{End, Lattice};
 use crate::maths::scalar;
 use crate::maths::vector;
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
@@ -92,6 +92,11 @@ impl Taps {
 }
 
 impl Line {
+    /// An axis of a lattice, so many of whose cells make one.
+    pub fn of(lattice: &Lattice, axis: usize, factor: usize) -> Self {
+        Self { n: lattice.cells[axis], factor, ends: lattice.ends[axis] }
+    }
+
     /// A kernel and what ends make of it: where its centre appears, in fine cells, and by which sign, as far as it reaches the
     /// line.
     fn images(self, centre: f64, reach: f64) -> impl Iterator<Item = (f64, f64)> {
