@@ -104,6 +104,7 @@ fn scene(flow: &FaceFlow, d: usize, dispersion: [f64; 4], n: u64, duration: f64)
             molecular: None,
             is_mobile: true,
             initial: constant(1.0),
+            made: None,
         }],
         decay: None,
         sub_steps: Some(SubSteps { courant: 0.15, dispersion: 0.06 }),

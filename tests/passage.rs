@@ -52,6 +52,7 @@ fn scene(
             molecular: None,
             is_mobile: true,
             initial: constant(0.0),
+            made: None,
         }],
         is_of_fluid: false,
         decay: None,

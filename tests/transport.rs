@@ -44,6 +44,7 @@ fn scene(low: &[f64], high: &[f64], rules: &[[SideRule; 2]], n: u64, duration: f
             molecular: None,
             is_mobile: true,
             initial: constant(0.0),
+            made: None,
         }],
         is_of_fluid: false,
         decay: None,

@@ -40,7 +40,6 @@ macro_rules! codes {
 codes! {
     S001 "the text does not fit the grammar here",
     S002 "a line begins with a word that begins no statement",
-    S003 "a statement is not in this version",
     S004 "a bracket has no partner",
     S005 "a text is never closed",
     S006 "a character has no meaning here",
@@ -139,6 +138,7 @@ codes! {
     M035 "a flow that changes all the time",
     M036 "parcels cannot exchange in this scene",
     M037 "a profile that is no kernel",
+    M038 "a reaction that pairs cannot do",
     T101 "a table of numbers cannot be read",
     T102 "the rows of a table make no function",
     T103 "a table is asked beyond its rows",
@@ -164,6 +164,7 @@ codes! {
     N205 "a flow from files makes or loses water",
     N206 "a step exchanges too much",
     N207 "a bandwidth that reaches nobody or too many",
+    N208 "a step in which pairs react too much",
     N301 "the run does not fit into memory",
     L010 "what a scene does not need is left out",
 }

@@ -225,7 +225,8 @@ impl<'a, const D: usize> Program<'a, D> {
                 averages,
                 ..Work::default()
             },
-            Stage::Observe => Work::default(),
+            // Of particles that carry mass, which are run elsewhere.
+            Stage::Estimate | Stage::Observe => Work::default(),
         });
         works.filter(|work| *work != Work::default()).collect()
     }

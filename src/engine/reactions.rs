@@ -226,42 +226,46 @@ impl Reactions {
 
     /// A failure of the chemistry in the words of the plan.
     pub fn explain<const D: usize>(&self, program: &Program<D>, why: Why) -> String {
-        let name = |idx: usize| program.plan.components.get(idx).map_or("?", |component| &component.name);
-        match why {
-            Why::StepTooSmall { component, t, step } => format!(
-                "at {} s a sub-step of {} s is still too long for `{}`",
-                precise(t),
-                precise(step),
-                name(component)
-            ),
-            Why::TooManySteps { t, tried, .. } => {
-                format!("{tried} sub-steps, the most that one step may take, end at {} s", precise(t))
-            }
-            Why::NotFinite { component, reaction } => {
-                let kinetics =
-                    program.plan.chemistry.as_ref().and_then(|chemistry| chemistry.kinetics.as_ref());
-                let own = reaction.and_then(|idx| kinetics?.reactions.get(idx));
-                let own = own.map_or_else(String::new, |own| format!(" in reaction `{}`", own.name));
-                format!("the rate of `{}`{own} is not a finite number", name(component))
-            }
-            Why::Negative { component, value } => {
-                format!("`{}` would become negative ({})", name(component), precise(value))
-            }
-            Why::Impossible => "no amounts of species in equilibrium have these totals".to_owned(),
-            Why::Endless => {
-                "no solution is at or below the saturation of all minerals: their constants contradict \
-                             each other"
-                    .to_owned()
-            }
-            Why::NoEquilibrium { residual } => {
-                format!("no equilibrium is found (relative residual {})", precise(residual))
-            }
-            Why::TooSalty { ionic_strength } => {
-                format!(
-                    "the ionic strength {} mol/L is more than activities are known for",
-                    precise(ionic_strength)
-                )
-            }
+        explain(program.plan, why)
+    }
+}
+
+/// A failure of the chemistry in the words of a plan.
+pub fn explain(plan: &Plan, why: Why) -> String {
+    let name = |idx: usize| plan.components.get(idx).map_or("?", |component| &component.name);
+    match why {
+        Why::StepTooSmall { component, t, step } => format!(
+            "at {} s a sub-step of {} s is still too long for `{}`",
+            precise(t),
+            precise(step),
+            name(component)
+        ),
+        Why::TooManySteps { t, tried, .. } => {
+            format!("{tried} sub-steps, the most that one step may take, end at {} s", precise(t))
+        }
+        Why::NotFinite { component, reaction } => {
+            let kinetics = plan.chemistry.as_ref().and_then(|chemistry| chemistry.kinetics.as_ref());
+            let own = reaction.and_then(|idx| kinetics?.reactions.get(idx));
+            let own = own.map_or_else(String::new, |own| format!(" in reaction `{}`", own.name));
+            format!("the rate of `{}`{own} is not a finite number", name(component))
+        }
+        Why::Negative { component, value } => {
+            format!("`{}` would become negative ({})", name(component), precise(value))
+        }
+        Why::Impossible => "no amounts of species in equilibrium have these totals".to_owned(),
+        Why::Endless => {
+            "no solution is at or below the saturation of all minerals: their constants contradict \
+                         each other"
+                .to_owned()
+        }
+        Why::NoEquilibrium { residual } => {
+            format!("no equilibrium is found (relative residual {})", precise(residual))
+        }
+        Why::TooSalty { ionic_strength } => {
+            format!(
+                "the ionic strength {} mol/L is more than activities are known for",
+                precise(ionic_strength)
+            )
         }
     }
 }

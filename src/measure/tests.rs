@@ -26,6 +26,7 @@ fn plan(axes: Vec<Axis>, outputs: Vec<Output>) -> Plan {
         reactions: vec![],
         chemistry: None,
         transport: None,
+        kernels: None,
         time: Time { step: 1.0, n_steps: 1, duration: 1.0 },
         outputs,
         writes_flow: false,

@@ -47,7 +47,8 @@ pub(super) fn of_masses(
 pub(super) fn displacements(plan: &Plan) -> f64 {
     let Some(transport) = &plan.transport else { return 1.0 };
     let Some(SubSteps { courant, dispersion }) = transport.sub_steps else { return 1.0 };
-    let (limit, n_cells) = longest(&plan.axes, &plan.outputs, transport, Auto { courant, dispersion }, 0.0);
+    let (limit, n_cells) =
+        longest(&plan.axes, &plan.outputs, transport, Auto { courant, dispersion, reaction: None }, 0.0);
     let expected = plan.time.step / limit;
     if n_cells > 1.0 && expected.is_finite() { expected.max(1.0) } else { 1.0 }
 }
@@ -146,7 +147,7 @@ fn limit(sizes: &[f64], velocity: &[f64], spread: &[f64], auto: Auto) -> f64 {
 }
 
 /// The next shorter step of which the duration is a multiple; all of it where nothing limits a step.
-fn whole(step: f64, duration: f64) -> f64 {
+pub(super) fn whole(step: f64, duration: f64) -> f64 {
     if !(step > 0.0 && step < duration) {
         return duration;
     }

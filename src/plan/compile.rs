@@ -101,6 +101,9 @@ fn compile_from(
             "none of the dispersion is exchange: mixing_fraction is 0",
         );
     }
+    if scenario.estimation.is_some() && scenario.particles.shares.is_none() {
+        draft.leave_out("kernels of particles with mass", "parcels of fluid carry concentrations");
+    }
     if let Err(reason) = draft.plan.check() {
         panic!("lowering made a plan that is not well-formed: {reason}");
     }

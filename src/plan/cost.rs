@@ -3,6 +3,7 @@
 use super::chemistry::{Chemistry, Method};
 use super::exchange::{Exchange, Integration, MOST_PAIR_BYTES};
 use super::integrator::Expected;
+use super::kernels::Manner;
 use super::time_scales::TimeScales;
 use super::transport::{Flow, Transport};
 use super::{Normals, Output, OutputKind, Plan, Stage, Zone, ZoneRate, turns};
@@ -32,6 +33,10 @@ mod table {
     pub(super) const NOTED_PAIR: [f64; 3] = [0.6, 0.6, 3.0];
     /// Neighbours where each parcel has a kernel of its own: more of them are looked at.
     pub(super) const OWN_KERNELS: f64 = 2.5;
+    /// One cell that a kernel reaches, cells that it reaches along an axis, and one search for the kernel of a cell.
+    pub(super) const KERNEL_CELL: f64 = 0.15;
+    pub(super) const KERNEL_LENGTH: f64 = 24.0;
+    pub(super) const SEARCH: f64 = 25_000.0;
     /// Relaxation of one stored value.
     pub(super) const MIX: f64 = 0.7;
     /// One reaction of a particle in closed form, with reading and writing it.
@@ -131,6 +136,7 @@ pub fn estimate(plan: &Plan, scales: Option<&TimeScales>) -> Cost {
         Stage::Exchange => exchange_cost(plan, n_values),
         Stage::KernelMean => means_cost(plan),
         Stage::Average => table::AVERAGE * n_values,
+        Stage::Estimate => estimate_cost(plan),
         Stage::FusedStep => {
             let step = move_cost * n_axes + table::BOUND * n_axes + table::AVERAGE * n_values;
             let is_coupled = plan.stages.contains(&Stage::FusedReact);
@@ -158,6 +164,22 @@ pub fn estimate(plan: &Plan, scales: Option<&TimeScales>) -> Cost {
         stages,
         cpu_seconds: nanoseconds * 1e-9,
     }
+}
+
+/// Nanoseconds per particle and step of finding concentrations in cells and what particles have of these, kernels of some five
+/// cells to each side; half of all cells have particles.
+fn estimate_cost(plan: &Plan) -> f64 {
+    let Some(kernels) = &plan.kernels else { return 0.0 };
+    let d = plan.axes.len() as i32;
+    let n_populations = plan.transport.as_ref().map_or(0, |transport| transport.populations.len()) as f64;
+    let n_cells = (0.5 * kernels.n_cells() as f64).min(plan.particles.count as f64);
+    let per_cell = match kernels.manner {
+        Manner::Adaptive => {
+            2.0 * table::KERNEL_CELL * table::KERNEL_LENGTH.powi(d) + table::SEARCH / kernels.refresh as f64
+        }
+        _ => 2.0 * table::KERNEL_CELL * table::KERNEL_LENGTH * f64::from(d),
+    };
+    n_populations * n_cells * per_cell / plan.particles.count as f64 + table::AVERAGE
 }
 
 /// Numbers per particle beside its position and what it carries: of parcels that come and go, and of those that are
@@ -312,6 +334,11 @@ fn react_cost(plan: &Plan, scales: Option<&TimeScales>) -> f64 {
             sub_steps(plan, chemistry, scales) * (price(table::ROSENBROCK) + speciations)
         }
     };
+    if let Some(kernels) = &plan.kernels {
+        // Cells react, and not particles.
+        let n_cells = 0.5 * kernels.n_cells() as f64;
+        return integrated * n_cells / plan.particles.count as f64;
+    }
     if plan.mixing.is_some() || plan.has_immobile() { integrated + table::GATHER * n } else { integrated }
 }
 

@@ -3,7 +3,7 @@
 use super::compile::Compiled;
 use super::cost::{Cost, n_stored_values};
 use super::{Mixing, Normals, Plan, Quantity, Stage, ZoneRate};
-use super::{explain_exchange, explain_reactions, explain_transport};
+use super::{explain_exchange, explain_kernels, explain_reactions, explain_transport};
 use crate::diagnostic::number;
 use std::fmt::Write as _;
 
@@ -19,6 +19,7 @@ pub fn explain(compiled: &Compiled, name: &str, title: Option<&str>) -> String {
     section(&mut text, "transport", &explain_transport::lines(&compiled.plan));
     section(&mut text, "exchange", &explain_exchange::lines(&compiled.plan));
     section(&mut text, "means over the parcels around", &explain_exchange::mean_lines(&compiled.plan));
+    section(&mut text, "kernels", &explain_kernels::lines(&compiled.plan));
     section(&mut text, "each step, in this order", &step_lines(compiled));
     section(&mut text, "what particles carry", &field_lines(&compiled.plan));
     section(&mut text, "reactions", &explain_reactions::lines(&compiled.plan));
@@ -122,6 +123,7 @@ fn stage_words(stage: Stage) -> &'static str {
         Stage::Exchange => "exchange: parcels and those around them exchange what they carry",
         Stage::KernelMean => "kernel mean: zones exchange with the means over the parcels around",
         Stage::Average => "average: sums and means per bin",
+        Stage::Estimate => "estimate: concentrations in cells, by kernels of particles",
         Stage::FusedReact => "mix and react in one pass over memory",
         Stage::FusedStep => "mix, move, bound and average in one pass over memory",
         Stage::Observe => "observe: outputs that are due",

@@ -148,7 +148,8 @@ fn floor_text(chemistry: &Chemistry) -> String {
 }
 
 fn splitting_line(plan: &Plan, chemistry: &Chemistry) -> &'static str {
-    let is_coupled = plan.mixing.is_some() || plan.has_immobile() || plan.exchange.is_some();
+    let is_coupled =
+        plan.mixing.is_some() || plan.has_immobile() || plan.exchange.is_some() || plan.reacting().is_some();
     match chemistry.splitting {
         _ if !is_coupled => "every particle is a batch of its own: taking turns with motion has no error",
         Splitting::Lie => "transport and reaction in turns: first order in the step (Lie)",

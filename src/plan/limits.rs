@@ -7,7 +7,8 @@ use super::cost::Cost;
 use super::passes::Draft;
 use super::time_scales::TimeScales;
 use super::{
-    OutputKind, Plan, ZoneRate, auto_step, averaging_limits, edges, exchange_limits, reaction_limits, shares,
+    OutputKind, Plan, ZoneRate, auto_step, averaging_limits, edges, exchange_limits, kernel_limits,
+    reaction_limits, shares,
 };
 use crate::diagnostic::codes::{N101, N102, N103, N104, N201, N202, N203, N204, N301};
 use crate::diagnostic::{Diagnostic, number, precise};
@@ -63,6 +64,7 @@ pub fn check(
     averaging_limits::check(scenario, plan, &mut limits, &mut diagnostics);
     exchange_limits::check(scenario, plan, &mut limits, &mut diagnostics);
     reaction_limits::check(scenario, plan, scales, &mut limits, &mut diagnostics);
+    kernel_limits::check(scenario, plan, &mut limits, &mut diagnostics);
     check_memory(scenario, plan, cost, memory, &mut diagnostics);
     (limits, diagnostics)
 }

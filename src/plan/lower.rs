@@ -4,14 +4,15 @@ use super::averaging::Averaging;
 use super::build_tape::build_reference;
 use super::evaluation::{self, Evaluation};
 use super::exchange::Exchange;
+use super::kernels::Reacting;
 use super::lower_chemistry::{self, Network};
 use super::lower_decay;
 use super::lower_exchange;
 use super::lower_transport::{self, of_fluid};
 use super::{
     Axis, InstantReaction, Mixing, NUMERICS_VERSION, Normals, Output, OutputUnit, Particles, Plan, Quantity,
-    Stage, Time, Walk, Zone, ZoneRate, auto_step, medium_limits, method, shares, side_water,
-    transport_limits,
+    Stage, Time, Walk, Zone, ZoneRate, auto_step, kernel_limits, kernels, medium_limits, method, shares,
+    side_water, start_rates, transport_limits,
 };
 use crate::diagnostic::Diagnostic;
 use crate::diagnostic::codes::{D008, M005};
@@ -32,13 +33,17 @@ pub fn lower(scenario: &Scenario) -> Result<Lowered, Vec<Diagnostic>> {
     let bins = scenario.bins.as_ref().map_or_else(|| vec![1; n_axes], |bins| bins.value.clone());
     let axes: Vec<Axis> =
         scenario.domain.axes.iter().zip(bins).map(|(axis, bins)| lower_axis(axis, bins)).collect();
-    let decay = lower_decay::decay(scenario)?;
+    let (decay, needs_kernels) = lower_decay::decay(scenario)?;
     let network = lower_chemistry::network(scenario, &axes)?;
     let (transport, told) = lower_transport::transport(scenario, &axes, &network, decay)?;
     let exchange = lower_exchange::exchange(scenario, &axes, transport.as_ref())?;
     let averaging = lower_exchange::averaging(scenario)?;
     let Network { species, components, chemistry, mut warnings, .. } = network;
     warnings.extend(told);
+    let instant: Vec<InstantReaction> = scenario.reactions.iter().filter_map(lower_reaction).collect();
+    let mut transport = transport;
+    let reacts = needs_kernels && (chemistry.is_some() || !instant.is_empty());
+    let kernels = kernels::lower(scenario, &axes, &mut transport, (reacts, chemistry.as_ref(), &instant));
     let extent: f64 = axes.iter().map(|axis| axis.high - axis.low).product();
     // A particle is a volume of water.
     let porosity = match &transport {
@@ -54,9 +59,10 @@ pub fn lower(scenario: &Scenario) -> Result<Lowered, Vec<Diagnostic>> {
         stages: stages(exchange.as_ref(), averaging.as_ref()),
         mixing: scenario.mixing.as_ref().map(|mixing| lower_mixing(mixing, averaging)),
         exchange,
-        reactions: scenario.reactions.iter().filter_map(lower_reaction).collect(),
+        reactions: instant,
         chemistry,
         transport,
+        kernels,
         time: Time::new(scenario.run.duration, scenario.run.step),
         outputs: scenario.outputs.iter().map(lower_output).collect(),
         writes_flow: scenario.flow_table.is_some(),
@@ -66,11 +72,9 @@ pub fn lower(scenario: &Scenario) -> Result<Lowered, Vec<Diagnostic>> {
     if !plan.walk.drift.iter().chain(&plan.walk.spread).copied().all(f64::is_finite) {
         return Err(vec![unbounded_walk(scenario, &plan)]);
     }
-    if plan.carries_mass() {
-        only_masses(&mut plan);
-    } else if plan.transport.is_some() {
-        only_tracks(&mut plan);
-    }
+    kernel_limits::refuse(scenario, &plan)?;
+    plan.outputs.extend(kernels::shown(&plan));
+    only_what_it_has(&mut plan);
     if let Some(auto) = scenario.run.auto {
         choose_step(scenario, &mut plan, auto)?;
     }
@@ -83,7 +87,7 @@ pub fn lower(scenario: &Scenario) -> Result<Lowered, Vec<Diagnostic>> {
         warnings.extend(medium_limits::check(scenario, &plan));
     }
     method::choose(&mut plan);
-    if plan.reacts_in_steps() {
+    if plan.reacts_in_steps() && !plan.carries_mass() {
         plan.stages.insert(1, Stage::React);
     }
     Ok((plan, evaluation, warnings))
@@ -109,15 +113,30 @@ fn stages(exchange: Option<&Exchange>, averaging: Option<&Averaging>) -> Vec<Sta
     stages
 }
 
+/// What particles of a kind do not have is not in their plan.
+fn only_what_it_has(plan: &mut Plan) {
+    if plan.carries_mass() {
+        only_masses(plan);
+    } else if plan.transport.is_some() {
+        only_tracks(plan);
+    }
+}
+
 /// Masses carry nothing beside their position, and walk by `transport` alone.
 fn only_masses(plan: &mut Plan) {
-    plan.components.clear();
-    plan.species.iter_mut().for_each(|species| species.terms.clear());
-    plan.chemistry = None;
+    let reacts = plan.reacting().is_some();
+    if !reacts {
+        plan.components.clear();
+        plan.species.iter_mut().for_each(|species| species.terms.clear());
+        plan.chemistry = None;
+    }
     only_tracks(plan);
-    let reacts = plan.transport.as_ref().is_some_and(|transport| transport.decay.is_some());
-    let stages = [Stage::React, Stage::Move, Stage::Observe];
-    plan.stages = stages.into_iter().filter(|stage| reacts || *stage != Stage::React).collect();
+    let decays = plan.transport.as_ref().is_some_and(|transport| transport.decay.is_some());
+    plan.stages = match (decays, reacts) {
+        (true, _) => vec![Stage::React, Stage::Move, Stage::Observe],
+        (false, true) => vec![Stage::Move, Stage::Estimate, Stage::React, Stage::Observe],
+        (false, false) => vec![Stage::Move, Stage::Observe],
+    };
     let populations = plan.transport.iter().flat_map(|transport| &transport.populations);
     plan.particles.count = populations.fold(0, |sum: u64, it| sum.saturating_add(it.count)).max(1);
 }
@@ -141,6 +160,7 @@ fn choose_step(scenario: &Scenario, plan: &mut Plan, auto: Auto) -> Result<(), V
         }
         None => auto_step::of_fluid(plan, auto, duration),
     };
+    let chosen = slow_enough(plan, chosen, auto, duration);
     let n_steps = duration / chosen.step;
     if n_steps > scenario::MAX_STEPS {
         let message = Diagnostic::error(M005, "the run would have too many steps")
@@ -155,6 +175,24 @@ fn choose_step(scenario: &Scenario, plan: &mut Plan, auto: Auto) -> Result<(), V
         transport.sub_steps = chosen.sub_steps;
     }
     Ok(())
+}
+
+/// The bound of reactions in a step of a scene whose particles react by kernels: transport and they take turns.
+const REACTION: f64 = 0.1;
+
+/// A step in which nothing reacts by more than the criterion says.
+fn slow_enough(plan: &Plan, chosen: auto_step::Chosen, auto: Auto, duration: f64) -> auto_step::Chosen {
+    let usual = plan.reacting().map(|_| REACTION);
+    let Some(bound) = auto.reaction.or(usual) else { return chosen };
+    let Some(rates) = start_rates::start_rates(plan) else { return chosen };
+    let rates = if plan.reacting() == Some(Reacting::Pairs) { rates.losses } else { rates.speeds };
+    let fastest = rates.into_iter().fold(0.0, f64::max);
+    if fastest * chosen.step <= bound {
+        return chosen;
+    }
+    let step = auto_step::whole(bound / fastest, duration);
+    let step = auto_step::fitting(&plan.outputs, step, duration).unwrap_or(step);
+    auto_step::Chosen { step, ..chosen }
 }
 
 /// Numbers that can be written may have a difference or a product that is none.

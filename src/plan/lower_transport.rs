@@ -375,6 +375,7 @@ impl Lowering<'_> {
                 molecular: species.diffusion.or(own),
                 is_mobile: !species.is_immobile,
                 initial: self.tape(&species.initial, species.span)?,
+                made: None,
             });
         }
         Some(list)

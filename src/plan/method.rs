@@ -14,6 +14,8 @@ pub(super) fn choose(plan: &mut Plan) {
     let changes_water = plan.transport.as_ref().is_some_and(super::transport::Transport::changes_water);
     // What has left is not there when somebody looks.
     let changes_water = changes_water || plan.outputs.iter().any(|output| output.kind.counts_passages());
+    // Particles that carry mass carry what has reacted.
+    let changes_water = changes_water || plan.reacting().is_some();
     let Some(chemistry) = &mut plan.chemistry else { return };
     let is_closed = chemistry.equilibrium.is_none();
     let integrator = chemistry.integrator;

@@ -22,11 +22,14 @@ pub mod exchange;
 mod exchange_limits;
 pub mod explain;
 mod explain_exchange;
+mod explain_kernels;
 mod explain_reactions;
 mod explain_transport;
 pub mod gates;
 pub mod in_time;
 mod integrator;
+mod kernel_limits;
+pub mod kernels;
 mod law;
 pub mod limits;
 mod lower;
@@ -41,6 +44,7 @@ mod periods;
 mod reaction_limits;
 mod shares;
 pub mod side_water;
+mod start_rates;
 pub mod station;
 pub mod tape;
 pub mod time_scales;
@@ -54,6 +58,7 @@ pub use compile::{Compiled, Options, Selection, compile, hash};
 use averaging::Averaging;
 use chemistry::Chemistry;
 use exchange::Exchange;
+use kernels::Kernels;
 use serde::{Deserialize, Serialize};
 use tape::Tape;
 use transport::Transport;
@@ -85,6 +90,9 @@ pub struct Plan {
     /// Absent where one velocity and one tensor say everything.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub transport: Option<Transport>,
+    /// How concentrations of particles that carry mass are found; absent where nobody needs them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub kernels: Option<Kernels>,
     pub time: Time,
     pub outputs: Vec<Output>,
     /// Whether the cells of the flow are written.
@@ -330,6 +338,8 @@ pub enum Stage {
     Exchange,
     /// Zones exchange with the means over the parcels around, at the positions reached.
     KernelMean,
+    /// Concentrations by kernels at the positions reached.
+    Estimate,
     /// Bin index of every particle, sums per bin, means.
     Average,
     /// Mix and React in one pass over memory, both of the step before.

@@ -27,7 +27,7 @@ pub(super) fn check(
     limits: &mut Vec<Limit>,
     diagnostics: &mut Vec<Diagnostic>,
 ) {
-    if plan.has_immobile() {
+    if plan.has_immobile() && !plan.carries_mass() {
         particles_per_bin(scenario, plan, diagnostics);
     }
     noise_of_means(scenario, plan, limits, diagnostics);

@@ -142,14 +142,16 @@ pub(super) fn spread(axes: &[Axis], dispersion: &Dispersion, speed: f64) -> f64 
 pub(super) fn counts(scenario: &Scenario, axes: &[Axis], transport: &Transport) -> Vec<u64> {
     match &scenario.particles.shares {
         Some(Shares::Given(counts)) => counts.clone(),
-        _ => {
-            let speed = speed(axes, transport);
-            let duration = scenario.run.duration;
-            let mass = |population: &Population| masses(axes, transport, population, speed, duration);
-            let masses: Vec<f64> = transport.populations.iter().map(mass).collect();
-            divide(scenario.particles.count, &masses)
-        }
+        _ => divide(scenario.particles.count, &all_masses(scenario, axes, transport)),
     }
+}
+
+/// Mass that each population will have in all, as far as that can be told before.
+pub(super) fn all_masses(scenario: &Scenario, axes: &[Axis], transport: &Transport) -> Vec<f64> {
+    let speed = speed(axes, transport);
+    let duration = scenario.run.duration;
+    let mass = |population: &Population| masses(axes, transport, population, speed, duration);
+    transport.populations.iter().map(mass).collect()
 }
 
 /// A number in parts in proportion to weights: sums are kept as far as each part has one at least.

@@ -33,9 +33,9 @@ impl Plan {
         doors
     }
 
-    /// Whether parcels of water react on their way.
-    pub fn has_fluid_reactions(&self) -> bool {
-        !self.carries_mass() && self.reacts_in_steps()
+    /// Whether what particles carry changes by all reactions together.
+    pub fn has_joint_reactions(&self) -> bool {
+        if self.carries_mass() { self.reacting().is_some() } else { self.reacts_in_steps() }
     }
 
     /// The word of a side: twice the active axis, plus one at its upper end.
@@ -57,7 +57,7 @@ impl Plan {
                 let mut places = self.doors();
                 let decay = self.transport.iter().flat_map(|transport| &transport.decay);
                 places.extend(decay.flat_map(|decay| &decay.reactions).map(|turn| turn.name.clone()));
-                if self.has_fluid_reactions() {
+                if self.has_joint_reactions() {
                     places.push(REACTIONS.to_owned());
                 }
                 places.extend([INSIDE.to_owned(), DEFECT.to_owned()]);

@@ -3,7 +3,7 @@
 //! Owns the states that are looked at and the numbers found there. May use the tape. It deliberately runs
 //! no particle: a few states, and a coarse implicit course from each to the end of the run.
 
-use super::chemistry::Kinetics;
+use super::chemistry::{Kinetic, Kinetics};
 use super::tape::dual::{Slopes, differentiate};
 use super::{Axis, Plan};
 use crate::maths::scalar::ln;
@@ -81,6 +81,45 @@ impl TimeScales {
         let slowest_rate = rates.iter().copied().filter(|rate| *rate > 0.0).fold(f64::INFINITY, f64::min);
         (rates[fastest] > 0.0).then_some(Self { rates, steepest, fastest, slowest_rate, way })
     }
+}
+
+/// How fast reactions are at the start, per reaction, 1/s.
+pub(super) struct AtStart {
+    /// The largest |∇r · ν|.
+    pub speeds: Vec<f64>,
+    /// The largest part of a reactant that is taken in a time, ν r/c.
+    pub losses: Vec<f64>,
+}
+
+/// At the initial states, and at the one with every component at its largest or at `brought`; nothing without rates.
+pub(super) fn at_start(plan: &Plan, brought: &[f64]) -> Option<AtStart> {
+    let kinetics = plan.chemistry.as_ref()?.kinetics.as_ref()?;
+    let network = Network { plan, kinetics };
+    let mut states = network.states();
+    let largest = |k: usize| states.iter().map(|(_, values)| values[k]).fold(brought[k], f64::max);
+    let most: Vec<f64> = (0..plan.components.len()).map(largest).collect();
+    states.extend(states.first().map(|(place, _)| (*place, most)));
+    let n = kinetics.reactions.len();
+    let mut found = AtStart { speeds: vec![0.0; n], losses: vec![0.0; n] };
+    for (place, state) in states {
+        let raised = network.raised(&state);
+        let (rates, slopes) = network.rates(place, 0.0, &raised);
+        for (k, reaction) in kinetics.reactions.iter().enumerate() {
+            found.speeds[k] = found.speeds[k].max(speed(reaction, &slopes[k]));
+            let loss = |&(i, nu): &(usize, f64)| (-nu * rates[k] / raised[i]).max(0.0);
+            let losses = reaction.changes.iter().filter(|(i, _)| raised[*i] > 0.0).map(loss);
+            found.losses[k] = losses.filter(|own| own.is_finite()).fold(found.losses[k], f64::max);
+        }
+    }
+    Some(found)
+}
+
+/// |∇r · ν| of a reaction, 1/s.
+fn speed(reaction: &Kinetic, slopes: &Slopes) -> f64 {
+    let slope_by =
+        |i: usize| slopes.binary_search_by_key(&i, |(other, _)| *other).map_or(0.0, |at| slopes[at].1);
+    let own: f64 = reaction.changes.iter().map(|&(i, nu)| nu * slope_by(i)).sum();
+    if own.is_finite() { own.abs() } else { 0.0 }
 }
 
 struct Network<'p> {
@@ -198,15 +237,8 @@ impl Network<'_> {
             let mut f = vec![0.0; n];
             let mut j = vec![0.0; n * n];
             for (k, reaction) in self.kinetics.reactions.iter().enumerate() {
-                let speed = |slopes: &Slopes| -> f64 {
-                    let slope_by = |i: usize| {
-                        slopes.binary_search_by_key(&i, |(other, _)| *other).map_or(0.0, |at| slopes[at].1)
-                    };
-                    let own: f64 = reaction.changes.iter().map(|&(i, nu)| nu * slope_by(i)).sum();
-                    if own.is_finite() { own.abs() } else { 0.0 }
-                };
-                let own = speed(&slopes[k]);
-                largest[k] = largest[k].max(above.as_ref().map_or(own, |above| speed(&above[k])));
+                let own = speed(reaction, &slopes[k]);
+                largest[k] = largest[k].max(above.as_ref().map_or(own, |above| speed(reaction, &above[k])));
                 *steepest = steepest.max(own);
                 fastest = fastest.max(own);
                 for &(i, nu) in &reaction.changes {

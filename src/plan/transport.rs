@@ -360,6 +360,9 @@ pub struct Population {
     pub is_mobile: bool,
     /// Concentration in the water at the start.
     pub initial: Tape,
+    /// Mass of a particle that a reaction makes, where it is not that of the others, mol or kg.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub made: Option<f64>,
 }
 
 /// First-order reactions of what particles carry: one becomes another, or is gone.

@@ -217,6 +217,10 @@ pub enum OutputKind {
     Dilution,
     /// What has entered and left, by where, and what is there.
     Budget,
+    /// Density of masses by kernels, cell by cell, with their bandwidths.
+    Density,
+    /// How wide kernels are.
+    Kernels,
 }
 
 pub(super) const OUTPUTS: &[(&str, OutputKind)] = &[
@@ -231,6 +235,8 @@ pub(super) const OUTPUTS: &[(&str, OutputKind)] = &[
     ("moments", OutputKind::Moments),
     ("dilution", OutputKind::Dilution),
     ("budget", OutputKind::Budget),
+    ("density", OutputKind::Density),
+    ("kernels", OutputKind::Kernels),
 ];
 
 impl OutputKind {
@@ -264,6 +270,7 @@ impl OutputKind {
                 | OutputKind::FirstPassage
                 | OutputKind::Moments
                 | OutputKind::Dilution
+                | OutputKind::Kernels
         )
     }
 
@@ -276,6 +283,8 @@ impl OutputKind {
                 | OutputKind::Moments
                 | OutputKind::Dilution
                 | OutputKind::Budget
+                | OutputKind::Density
+                | OutputKind::Kernels
         )
     }
 
@@ -291,7 +300,7 @@ impl OutputKind {
 
     /// Whether only particles that carry mass have it: parcels of water pass again and again with other contents.
     pub fn needs_masses(self) -> bool {
-        self == OutputKind::FirstPassage
+        matches!(self, OutputKind::FirstPassage | OutputKind::Density | OutputKind::Kernels)
     }
 }
 

@@ -33,6 +33,7 @@ pub(super) struct Statements<'a> {
     pub zones: Option<(Span, &'a [tree::Zone])>,
     pub exchange: Option<(Span, &'a [tree::Field])>,
     pub kernels: Vec<&'a tree::Kernel>,
+    pub estimate: Option<(Span, &'a tree::Estimate)>,
     pub average: Option<(Span, &'a tree::Average)>,
     pub initials: Vec<&'a tree::Assignment>,
     pub particles: Option<(Span, &'a tree::Particles)>,
@@ -178,6 +179,7 @@ fn gather<'a>(file: &'a tree::File, diagnostics: &mut Vec<Diagnostic>) -> Statem
             StatementKind::MixingZones(s) => all.zones = Some((span, s)),
             StatementKind::Exchange(s) => all.exchange = Some((span, s)),
             StatementKind::Kernel(s) => all.kernels.push(s),
+            StatementKind::Estimate(s) => all.estimate = Some((span, s)),
             StatementKind::Average(s) => all.average = Some((span, s)),
             StatementKind::Initial(list) => all.initials.extend(list),
             StatementKind::Particles(s) => all.particles = Some((span, s)),
@@ -207,6 +209,7 @@ fn single(kind: &StatementKind) -> Option<&'static str> {
         StatementKind::MixingZones(_) => "mixing zones",
         StatementKind::Exchange(_) => "exchange",
         StatementKind::Average(_) => "average",
+        StatementKind::Estimate(_) => "kernel",
         StatementKind::Particles(_) => "particles",
         StatementKind::Run(_) => "run",
         _ => return None,
@@ -302,7 +305,7 @@ fn build<'a>(
     if !(are_outputs_right && are_references_right && is_analysis_right) {
         return None;
     }
-    let ((medium, flow, dispersion), (exchange, kernels, averaging)) = (motion?, exchanges?);
+    let ((medium, flow, dispersion), (exchange, kernels, averaging, estimation)) = (motion?, exchanges?);
     let scenario = Scenario {
         title: statements.title.map(|title| title.value.clone()),
         citations: statements.citations.iter().map(|text| text.value.clone()).collect(),
@@ -321,6 +324,7 @@ fn build<'a>(
         exchange,
         kernels,
         averaging,
+        estimation,
         bins: bins?,
         particles: particles?,
         run: run?,

@@ -6,6 +6,7 @@
 use super::check::{Allow, Checker};
 use super::choice::{INTEGRATIONS, Integration, NORMALISATIONS, Normalisation};
 use super::collect::Statements;
+use super::estimation::{Estimation, estimation};
 use super::expression::{Expr, Node};
 use super::scope::{Locals, Origin};
 use super::slot::collect_names;
@@ -125,16 +126,17 @@ const WORDS_OF_MEANS: &[(&str, Word)] = &[
     ("bins", Word::Bins),
 ];
 
-/// The exchange of a scene, if it has one, its kernels in the order of the text, and the means that zones exchange with;
-/// `None` if something is wrong.
-pub(super) fn exchanges<'a>(
-    checker: &mut Checker<'a>,
-    statements: &Statements<'a>,
-) -> Option<(Option<Exchange>, Vec<Kernel>, Option<Averaging>)> {
+/// An exchange, kernels of the scene, means that zones exchange with, and how concentrations of masses are found.
+type Exchanges = (Option<Exchange>, Vec<Kernel>, Option<Averaging>, Option<Estimation>);
+
+/// The exchange of a scene, if it has one, its kernels in the order of the text, and what else has kernels; `None` if
+/// something is wrong.
+pub(super) fn exchanges<'a>(checker: &mut Checker<'a>, statements: &Statements<'a>) -> Option<Exchanges> {
     let kernels: Vec<Option<Kernel>> =
         statements.kernels.iter().map(|written| own(checker, written)).collect();
     let (exchange, averaging) = (statement(checker, statements), averaging(checker, statements));
-    Some((exchange?, kernels.into_iter().collect::<Option<_>>()?, averaging?))
+    let estimation = estimation(checker, statements);
+    Some((exchange?, kernels.into_iter().collect::<Option<_>>()?, averaging?, estimation?))
 }
 
 /// `Some(None)` without the statement.

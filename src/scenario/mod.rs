@@ -12,6 +12,7 @@ pub mod condition;
 mod data;
 mod data_files;
 mod equilibrium;
+pub mod estimation;
 pub mod exchange;
 mod exchange_places;
 pub mod expression;
@@ -99,6 +100,8 @@ pub struct Scenario {
     pub kernels: Vec<exchange::Kernel>,
     /// What zones exchange with, if it is not the mean of a bin.
     pub averaging: Option<exchange::Averaging>,
+    /// How concentrations of masses are found; absent without a statement.
+    pub estimation: Option<estimation::Estimation>,
     /// Bins of the averages, one count per axis of the domain.
     pub bins: Option<Spanned<Vec<usize>>>,
     pub particles: Particles,

@@ -98,6 +98,54 @@ const BUDGET: &[Number] = &[
     ),
 ];
 
+const DENSITY: &[Number] = &[
+    number(
+        "concentration",
+        Rule::Value,
+        "of the water of the cell, by kernels: density over porosity and retardation",
+    ),
+    number("standard_error", Rule::Value, "of the concentration, by the number of particles"),
+    number("density", Rule::Value, "mass of the species, mobile and sorbed, per volume of the medium"),
+    number("x", Rule::Length(1), "centre of the cell; null without the axis"),
+    number("y", Rule::Length(1), "centre of the cell; null without the axis"),
+    number("z", Rule::Length(1), "centre of the cell; null without the axis"),
+    number(
+        "bandwidth_x",
+        Rule::Length(1),
+        "of the kernel of the cell; null without particles, kernel or axis",
+    ),
+    number(
+        "bandwidth_y",
+        Rule::Length(1),
+        "of the kernel of the cell; null without particles, kernel or axis",
+    ),
+    number(
+        "bandwidth_z",
+        Rule::Length(1),
+        "of the kernel of the cell; null without particles, kernel or axis",
+    ),
+    number(
+        "support",
+        Rule::Length(1),
+        "width within which the error of the kernel was least; null without one",
+    ),
+    number("n_particles", Rule::Count, "particles in the cell"),
+];
+
+const KERNELS: &[Number] = &[
+    number(
+        "bandwidth",
+        Rule::Value,
+        "median over particles of the geometric mean of a kernel's bandwidths; null without particles",
+    ),
+    number("narrow", Rule::Length(1), "that of a twentieth of all particles is narrower"),
+    number("wide", Rule::Length(1), "that of a twentieth of all particles is wider"),
+    number("stretch", Rule::Ratio, "median of a kernel's widest over its narrowest bandwidth"),
+    number("effective", Rule::Ratio, "effective number of particles: (sum m)^2 / sum m^2"),
+    number("n_particles", Rule::Count, "particles in the domain"),
+    number("n_loops", Rule::Count, "loops until the bandwidths settled"),
+];
+
 impl OutputKind {
     /// The numbers of a row, the first of which measures and figures speak of; none where there are no rows.
     pub fn numbers(self) -> &'static [Number] {
@@ -107,6 +155,8 @@ impl OutputKind {
             OutputKind::Moments => MOMENTS,
             OutputKind::Dilution => DILUTION,
             OutputKind::Budget => BUDGET,
+            OutputKind::Density => DENSITY,
+            OutputKind::Kernels => KERNELS,
             OutputKind::Profile
             | OutputKind::Covariance
             | OutputKind::Map

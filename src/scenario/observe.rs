@@ -22,7 +22,8 @@ impl OutputKind {
         match self {
             OutputKind::Profile | OutputKind::Map | OutputKind::Particles => c,
             OutputKind::Covariance => c.times(c),
-            OutputKind::Breakthrough => c,
+            OutputKind::Breakthrough | OutputKind::Density => c,
+            OutputKind::Kernels => Dimension::LENGTH,
             OutputKind::Total | OutputKind::FirstPassage | OutputKind::Moments | OutputKind::Budget => {
                 c.times(volume)
             }

@@ -36,6 +36,8 @@ pub enum Purpose {
     Interface,
     /// The same on the way to a time between two steps.
     BridgeInterface,
+    /// What reactions make of particles, and where.
+    React,
 }
 
 /// The generator of one purpose under one root seed.
@@ -62,6 +64,7 @@ impl Stream {
             Purpose::BridgeTurn => "bridge turn",
             Purpose::Interface => "interface",
             Purpose::BridgeInterface => "bridge interface",
+            Purpose::React => "react",
         };
         let mut hasher = blake3::Hasher::new();
         hasher.update(b"lamella random stream 1\0");

@@ -10,7 +10,7 @@ use super::grammar::{Grammar, rule_of};
 use super::lexer::tokenize;
 use super::split::{Chunk, Lexed, split};
 use super::tree::{File, Statement, StatementKind, TokenKind};
-use super::words::{LATER_FORMS, RESERVED_WORDS, STATEMENT_KEYWORDS, is_statement_keyword};
+use super::words::{RESERVED_WORDS, STATEMENT_KEYWORDS, is_statement_keyword};
 use crate::diagnostic::{Diagnostic, codes, did_you_mean};
 use crate::source::{FileId, Span};
 use pest::Parser;
@@ -82,9 +82,6 @@ fn parse_statement(file: FileId, lexed: Lexed, chunk: &Chunk) -> Result<Statemen
         return Err(before_grammar);
     }
     let keyword = lexed.slice(chunk.first);
-    if let Some(refusal) = later_form(lexed, chunk) {
-        return Err(vec![refusal]);
-    }
     let Some(rule) = rule_of(keyword) else { return Err(vec![unknown_statement(lexed, chunk)]) };
     let span = chunk_span(lexed, chunk);
     let place = Place { file, offset: span.start as usize };
@@ -97,18 +94,6 @@ fn parse_statement(file: FileId, lexed: Lexed, chunk: &Chunk) -> Result<Statemen
 
 fn chunk_span(lexed: Lexed, chunk: &Chunk) -> Span {
     lexed.tokens[chunk.first].span.to(lexed.tokens[chunk.end - 1].span)
-}
-
-/// A statement in a form that only later versions run.
-fn later_form(lexed: Lexed, chunk: &Chunk) -> Option<Diagnostic> {
-    let mut words = (chunk.first..chunk.end).filter(|&idx| lexed.is_significant(idx));
-    let (keyword, _, word) = (words.next()?, words.next()?, words.next()?);
-    let form = (lexed.slice(keyword), lexed.slice(word));
-    LATER_FORMS.contains(&form).then(|| {
-        Diagnostic::error(codes::S003, format!("`{} … {}` is not in this version", form.0, form.1))
-            .at(lexed.tokens[word].span, "this statement is known to the language, but not built yet")
-            .help("leave it out")
-    })
 }
 
 /// A line whose first word begins no statement.

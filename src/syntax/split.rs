@@ -166,9 +166,9 @@ fn looks_like_statement(lexed: Lexed, idx: usize) -> bool {
     let Some(next) = lexed.next_on_line(idx + 1) else { return false };
     match lexed.tokens[next].kind {
         // `kernel gaussian` is a setting of an exchange that goes on.
-        TokenKind::Word if lexed.slice(idx) == "kernel" => {
-            lexed.next_on_line(next + 1).is_some_and(|after| matches!(lexed.slice(after), "(" | "adaptive"))
-        }
+        TokenKind::Word if lexed.slice(idx) == "kernel" => lexed
+            .next_on_line(next + 1)
+            .is_some_and(|after| matches!(lexed.slice(after), "(" | "adaptive" | "global" | "fixed")),
         TokenKind::Word => !RESERVED_WORDS.contains(&lexed.slice(next)),
         TokenKind::Text | TokenKind::Number => true,
         _ => lexed.slice(idx) == "dispersion" && lexed.slice(next) == "(",

@@ -11,7 +11,7 @@ mod transport;
 
 use crate::source::{Span, Spanned};
 pub use data::{Data, DataColumn};
-pub use kernel::Kernel;
+pub use kernel::{Estimate, EstimateEntry, EstimateValue, Kernel};
 pub use outputs::{Output, Place, Times};
 pub use study::{Criterion, Expect, Replicates, Report, Sweep, SweepAxis, SweepEntry, SweepValue, Use};
 pub use transport::{
@@ -111,6 +111,8 @@ pub enum StatementKind {
     Exchange(Vec<Field>),
     /// `kernel W(q) = (1 - q/2)^4 * (1 + 2*q) support 2 "doc"`
     Kernel(Kernel),
+    /// `kernel gaussian adaptive { bandwidth 0.2 .. 5 m, grid 0.5 m }`
+    Estimate(Estimate),
     /// `average bins 300`, `average bins 100 x 50` or `average kernel gaussian, bandwidth 2 mm`
     Average(Average),
     /// `initial A = …, B = …`

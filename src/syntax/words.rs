@@ -37,9 +37,6 @@ pub const STATEMENT_KEYWORDS: &[&str] = &[
     "report",
 ];
 
-/// Forms of statements that this version does not run yet: the keyword, and the word after the name.
-pub const LATER_FORMS: &[(&str, &str)] = &[("kernel", "adaptive")];
-
 /// Statements whose body in braces may hold what looks like statements.
 pub const BODY_KEYWORDS: &[&str] = &["sweep", "kernel"];
 
@@ -100,7 +97,20 @@ pub fn clause_words(keyword: &str) -> &'static [&'static str] {
             "diffusion_error",
             "compensate",
         ],
-        "kernel" => &["support"],
+        "kernel" => &[
+            "support",
+            "bandwidth",
+            "grid",
+            "correct",
+            "shape",
+            "orient",
+            "rule",
+            "weighing",
+            "tolerance",
+            "loops",
+            "refresh",
+            "reactions",
+        ],
         "particles" => &["disorder"],
         "mixing" => &["zones", "fraction", "rate"],
         "run" => &["to", "step"],

@@ -24,13 +24,15 @@ pub enum Kind {
     Moments,
     Dilution,
     Budget,
+    Density,
+    Kernels,
     Errors,
     ErrorBars,
     Flow,
 }
 
 impl Kind {
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 16] = [
         Self::Profile,
         Self::Map,
         Self::Covariance,
@@ -42,6 +44,8 @@ impl Kind {
         Self::Moments,
         Self::Dilution,
         Self::Budget,
+        Self::Density,
+        Self::Kernels,
         Self::Errors,
         Self::ErrorBars,
         Self::Flow,
@@ -61,6 +65,8 @@ impl Kind {
             Self::Moments => "moments",
             Self::Dilution => "dilution",
             Self::Budget => "budget",
+            Self::Density => "density",
+            Self::Kernels => "kernels",
             Self::Errors => "errors",
             Self::ErrorBars => "error_bars",
             Self::Flow => "flow",
@@ -82,6 +88,8 @@ impl From<OutputKind> for Kind {
             OutputKind::Moments => Self::Moments,
             OutputKind::Dilution => Self::Dilution,
             OutputKind::Budget => Self::Budget,
+            OutputKind::Density => Self::Density,
+            OutputKind::Kernels => Self::Kernels,
         }
     }
 }
@@ -190,6 +198,8 @@ pub fn columns(kind: Kind) -> Vec<Column> {
         Kind::Moments => columns.extend(row_columns(OutputKind::Moments)),
         Kind::Dilution => columns.extend(row_columns(OutputKind::Dilution)),
         Kind::Budget => columns.extend(row_columns(OutputKind::Budget)),
+        Kind::Density => columns.extend(row_columns(OutputKind::Density)),
+        Kind::Kernels => columns.extend(row_columns(OutputKind::Kernels)),
         Kind::Errors => return error_columns(),
         Kind::ErrorBars => return error_bar_columns(),
         Kind::Flow => return super::cells::columns(),

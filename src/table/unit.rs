@@ -62,7 +62,8 @@ pub fn value_dimension(plan: &Plan, kind: OutputKind, quantity: Quantity, n_axes
         OutputKind::Profile | OutputKind::Map | OutputKind::Particles | OutputKind::Covariance => {
             concentration
         }
-        OutputKind::Breakthrough => concentration,
+        OutputKind::Breakthrough | OutputKind::Density => concentration,
+        OutputKind::Kernels => Dimension::LENGTH,
         OutputKind::Total
         | OutputKind::Mixing
         | OutputKind::FirstPassage

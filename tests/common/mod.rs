@@ -45,6 +45,7 @@ pub fn plan() -> Plan {
         reactions: Vec::new(),
         chemistry: None,
         transport: None,
+        kernels: None,
         time: Time { step: 2.0, n_steps: 10, duration: 20.0 },
         outputs: vec![
             output(OutputKind::Profile, vec![One(0), One(1)], vec![N_BINS, 1], &[10.0, 20.0]),

@@ -83,6 +83,7 @@ pub fn front(n_particles: u64, bins: usize, duration: f64, step: f64) -> Plan {
         }],
         chemistry: None,
         transport: None,
+        kernels: None,
         time: Time { step, n_steps: (duration / step - 1e-9).ceil() as u64, duration },
         outputs: vec![],
         writes_flow: false,

@@ -149,10 +149,3 @@ fn several_mistakes_are_told_in_one_run() {
     let codes: Vec<_> = messages_of(text).iter().map(|message| message.code.0).collect();
     assert_eq!(codes, ["S004", "S001", "S001", "S013"]);
 }
-
-#[test]
-fn statements_of_later_versions_are_one_message_each() {
-    let text = "lamella 1\nkernel a adaptive {\n  particles 1e3, 1e4\n  seed 2\n}\nkernel b adaptive\nseed 1";
-    let codes: Vec<_> = messages_of(text).iter().map(|message| message.code.0).collect();
-    assert_eq!(codes, ["S003", "S003"]);
-}

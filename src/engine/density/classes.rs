@@ -20,6 +20,7 @@ pub fn bandwidth_of(class: i64) -> f64 {
 }
 
 /// Kernels along an axis, far from its ends, by class.
+#[derive(Debug, Clone)]
 pub struct Table {
     first: i64,
     edge: f64,

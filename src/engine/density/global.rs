@@ -391,7 +391,7 @@ fn spread(
     field.values
 }
 
-fn band(line: Line, own: f64, is_squared: bool) -> Band {
+pub(super) fn band(line: Line, own: f64, is_squared: bool) -> Band {
     let integral = Integral::new();
     if !is_squared {
         return Band::gaussian(line, integral, (own, own));

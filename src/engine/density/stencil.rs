@@ -41,6 +41,13 @@ impl Lent<'_> {
         if self.shared.is_some() { self.first } else { self.own.first }
     }
 
+    /// The same taps, to be worked on.
+    pub fn copy_to(&self, taps: &mut Taps) {
+        taps.first = self.first();
+        taps.values.clear();
+        taps.values.extend_from_slice(self.values());
+    }
+
     #[inline(always)]
     fn values(&self) -> &[f64] {
         self.shared.unwrap_or(&self.own.values)

@@ -31,8 +31,11 @@ impl<const D: usize, M: Medium<D>> Run<'_, D, M> {
                 });
                 for births in born {
                     self.book_births(&births, 0.0, 0.0);
+                    let has_own = self.reactions.is_some();
                     for birth in births {
-                        flock::add(&mut self.flocks, birth.population, birth.id, birth.position);
+                        let mass = has_own.then(|| self.units.of(birth.population, birth.id));
+                        let particle = (birth.id, birth.position, mass);
+                        flock::add_weighed(&mut self.flocks, birth.population, particle);
                     }
                 }
             }
@@ -113,11 +116,12 @@ impl<const D: usize, M: Medium<D>> Run<'_, D, M> {
                     let (id, position) = (flock.ids[idx], flock.position(idx));
                     if inside(position) {
                         let what = What::Replaced { origin: release.origin };
-                        let mass = self.units.of(flock.population, id);
+                        let of_number = || self.units.of(flock.population, id);
+                        let mass = flock.masses.get(idx).copied().unwrap_or_else(of_number);
                         events.push(Event { what, population: flock.population, id, mass, t });
                         continue;
                     }
-                    flock.set(kept, id, position);
+                    flock.keep(kept, idx);
                     kept += 1;
                 }
                 flock.truncate(kept);

@@ -9,7 +9,9 @@ use super::super::track::tracker::Events;
 use super::super::track::turning::Turns;
 use super::super::track::walls::Exit;
 use super::flock;
+use super::total::Total;
 use super::units::Units;
+use crate::maths::exact::{Quanta, Sum};
 
 /// What can happen to a particle.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,6 +50,8 @@ pub struct Log<'a> {
     /// What those are that something happens to.
     pub population: usize,
     pub units: &'a Units,
+    /// Numbers and masses of those that have one of their own.
+    pub own: (&'a [u64], &'a [f64]),
     pub events: &'a mut Vec<Event>,
     /// Per way and origin what has turned; empty as long as nothing has.
     pub turned: &'a mut Vec<u128>,
@@ -56,7 +60,9 @@ pub struct Log<'a> {
 
 impl Log<'_> {
     fn note(&mut self, id: u64, what: What, t: f64) {
-        let mass = self.units.of(self.population, id);
+        let (ids, masses) = self.own;
+        let own = ids.iter().position(|other| *other == id).map(|at| masses[at]);
+        let mass = own.unwrap_or_else(|| self.units.of(self.population, id));
         self.events.push(Event { what, population: self.population, id, mass, t });
     }
 }
@@ -100,6 +106,18 @@ pub struct Book {
     ways: Vec<Way>,
     /// Per way and origin.
     turned: Vec<u128>,
+    /// Where particles have masses of their own.
+    own: Option<Own>,
+}
+
+/// Sums of masses that reactions have changed.
+#[derive(Debug, Clone)]
+struct Own {
+    quanta: Quanta,
+    /// Per population and door.
+    left: Vec<Sum>,
+    /// Per population: what reactions made and took.
+    reacted: Vec<[Total; 2]>,
 }
 
 impl Book {
@@ -120,6 +138,22 @@ impl Book {
             left: vec![0; n_populations * n_doors * n],
             turned: vec![0; ways.len() * n],
             ways,
+            own: None,
+        }
+    }
+
+    /// The books of particles whose masses change.
+    pub fn with_masses(mut self, quanta: Quanta, n_populations: usize) -> Self {
+        let left = vec![Sum::default(); n_populations * self.n_doors];
+        self.own = Some(Own { quanta, left, reacted: vec![Default::default(); n_populations] });
+        self
+    }
+
+    /// What reactions have made of a population, and what they have taken, in a step.
+    pub fn react(&mut self, population: usize, made: f64, taken: f64) {
+        if let Some(own) = &mut self.own {
+            own.reacted[population][0].add(made);
+            own.reacted[population][1].add(taken);
         }
     }
 
@@ -136,6 +170,9 @@ impl Book {
             What::Crossed { .. } => return,
         };
         self.left[(event.population * self.n_doors + door) * n + origin] += 1;
+        if let Some(own) = &mut self.own {
+            own.quanta.add(&mut own.left[event.population * self.n_doors + door], event.mass);
+        }
     }
 
     /// Adds what has turned, per way and origin.
@@ -157,6 +194,9 @@ impl Book {
 
     /// What went through a door since the start.
     pub fn left(&self, population: usize, door: usize) -> f64 {
+        if let Some(own) = &self.own {
+            return own.left[population * self.n_doors + door].value();
+        }
         let n = self.units.n_origins();
         let counts = &self.left[(population * self.n_doors + door) * n..][..n];
         self.units.sum(population, counts.iter().map(|&n| n as f64))
@@ -164,6 +204,10 @@ impl Book {
 
     /// What a reaction made of a population since the start, and what it took.
     pub fn turned(&self, population: usize, reaction: usize) -> (f64, f64) {
+        if let Some(own) = &self.own {
+            let [made, taken] = own.reacted[population].map(Total::value);
+            return (made, taken);
+        }
         let n = self.units.n_origins();
         let mut counts = [vec![0_u128; n], vec![0_u128; n]];
         for (idx, way) in self.ways.iter().enumerate().filter(|(_, way)| way.reaction == reaction) {
@@ -179,6 +223,10 @@ impl Book {
     /// What all reactions made of a population less what they took: particles are counted first, as many may have
     /// gone to and fro.
     pub fn net(&self, population: usize) -> f64 {
+        if let Some(own) = &self.own {
+            let [made, taken] = own.reacted[population].map(Total::value);
+            return made - taken;
+        }
         let n = self.units.n_origins();
         let mut net = vec![0_i128; n];
         for (idx, way) in self.ways.iter().enumerate() {
@@ -189,7 +237,9 @@ impl Book {
     }
 
     pub fn n_reactions(&self) -> usize {
-        self.ways.iter().map(|way| way.reaction + 1).max().unwrap_or(0)
+        // Masses change by all reactions together.
+        let of_masses = usize::from(self.own.is_some());
+        self.ways.iter().map(|way| way.reaction + 1).max().unwrap_or(of_masses)
     }
 
     /// Everything that came, and everything that went, through doors.

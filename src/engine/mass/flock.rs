@@ -30,11 +30,13 @@ pub struct Flock<const D: usize> {
     pub ids: Vec<u64>,
     /// m
     pub positions: [Vec<f64>; D],
+    /// mol or kg, where reactions change them; empty where a particle's number says what it weighs.
+    pub masses: Vec<f64>,
 }
 
 impl<const D: usize> Flock<D> {
     pub fn new(population: usize) -> Self {
-        Self { population, ids: Vec::new(), positions: [const { Vec::new() }; D] }
+        Self { population, ids: Vec::new(), positions: [const { Vec::new() }; D], masses: Vec::new() }
     }
 
     pub fn len(&self) -> usize {
@@ -48,6 +50,12 @@ impl<const D: usize> Flock<D> {
         }
     }
 
+    /// The same with a mass of its own.
+    pub fn push_weighed(&mut self, id: u64, position: [f64; D], mass: Option<f64>) {
+        self.push(id, position);
+        self.masses.extend(mass);
+    }
+
     pub fn position(&self, idx: usize) -> [f64; D] {
         std::array::from_fn(|axis| self.positions[axis][idx])
     }
@@ -59,7 +67,23 @@ impl<const D: usize> Flock<D> {
         }
     }
 
+    /// Puts what is at one place to another one before it.
+    pub fn keep(&mut self, to: usize, from: usize) {
+        self.ids[to] = self.ids[from];
+        self.positions.iter_mut().for_each(|axis| axis[to] = axis[from]);
+        if let Some(&mass) = self.masses.get(from) {
+            self.masses[to] = mass;
+        }
+    }
+
+    /// Mass of each particle, by what it is or by what its number says.
+    pub fn weights<'a>(&'a self, units: &'a [f64]) -> impl Fn(usize) -> f64 + 'a {
+        let is_own = !self.masses.is_empty();
+        move |idx| if is_own { self.masses[idx] } else { units[origin(self.ids[idx])] }
+    }
+
     pub fn truncate(&mut self, len: usize) {
+        self.masses.truncate(len);
         self.ids.truncate(len);
         self.positions.iter_mut().for_each(|axis| axis.truncate(len));
     }
@@ -67,12 +91,21 @@ impl<const D: usize> Flock<D> {
 
 /// Adds a particle to the last flock of its population, or to a new one.
 pub fn add<const D: usize>(flocks: &mut Vec<Flock<D>>, population: usize, id: u64, position: [f64; D]) {
+    add_weighed(flocks, population, (id, position, None));
+}
+
+/// The same with a mass of its own.
+pub fn add_weighed<const D: usize>(
+    flocks: &mut Vec<Flock<D>>,
+    population: usize,
+    (id, position, mass): (u64, [f64; D], Option<f64>),
+) {
     let last = flocks.iter_mut().rev().find(|flock| flock.population == population);
     match last {
-        Some(flock) if flock.len() < BLOCK => flock.push(id, position),
+        Some(flock) if flock.len() < BLOCK => flock.push_weighed(id, position, mass),
         _ => {
             let mut flock = Flock::new(population);
-            flock.push(id, position);
+            flock.push_weighed(id, position, mass);
             flocks.push(flock);
         }
     }
@@ -113,6 +146,7 @@ pub fn gather<const D: usize>(flocks: &mut Vec<Flock<D>>) {
         match room {
             Some(last) => {
                 last.ids.append(&mut flock.ids);
+                last.masses.append(&mut flock.masses);
                 last.positions.iter_mut().zip(&mut flock.positions).for_each(|(to, from)| to.append(from));
             }
             None => filled.push(flock),

@@ -114,7 +114,9 @@ impl<const D: usize, M: Medium<D>> Run<'_, D, M> {
                 Steps { first: steps.first + idx as u64, t: steps.t + idx as f64 * steps.dt, ..steps };
             births.sort_by_key(|birth| birth.population);
             for own in births.chunk_by(|one, other| one.population == other.population) {
-                groups.extend(own.chunks(LANES).map(|group| Group::new(group, steps)));
+                let units = self.units.row(own[0].population);
+                let units = self.reactions.is_some().then_some(units);
+                groups.extend(own.chunks(LANES).map(|group| Group::new(group, steps, units)));
             }
         }
         let run = &*self;
@@ -123,7 +125,9 @@ impl<const D: usize, M: Medium<D>> Run<'_, D, M> {
             let moved = std::mem::take(&mut found.moved);
             self.take(found)?;
             for idx in 0..flock.len() {
-                flock::add(&mut self.flocks, flock.population, flock.ids[idx], flock.position(idx));
+                let mass = flock.masses.get(idx).copied();
+                let particle = (flock.ids[idx], flock.position(idx), mass);
+                flock::add_weighed(&mut self.flocks, flock.population, particle);
             }
             flock::spread(&mut self.flocks, moved);
         }
@@ -182,11 +186,13 @@ struct Group<const D: usize> {
 }
 
 impl<const D: usize> Group<D> {
-    fn new(births: &[Birth<D>], steps: Steps) -> Self {
+    /// With masses of their own where units are given.
+    fn new(births: &[Birth<D>], steps: Steps, units: Option<&[f64]>) -> Self {
         let mut flock = Flock::new(births[0].population);
         let mut entered: Lane = [0.0; LANES];
         for (entered, birth) in entered.iter_mut().zip(births) {
-            flock.push(birth.id, birth.position);
+            let mass = units.map(|units| units[flock::origin(birth.id)]);
+            flock.push_weighed(birth.id, birth.position, mass);
             *entered = birth.entered;
         }
         Self { flock, births: births.to_vec(), entered, steps, found: Yield::default() }
@@ -243,7 +249,9 @@ fn go_on<const D: usize, M: Medium<D>>(
         let range = first..(first + LANES).min(n);
         bench.lanes.load(&flock.ids[range.clone()], flock.positions.each_ref().map(|x| &x[range.clone()]));
         let (events, turned) = (&mut found.events, &mut found.turned);
-        let mut log = Log { population: flock.population, units, events, turned, n_ways: 0 };
+        let own = if flock.masses.is_empty() { 0..0 } else { range.clone() };
+        let own = (&flock.ids[own.clone()], &flock.masses[own]);
+        let mut log = Log { population: flock.population, units, own, events, turned, n_ways: 0 };
         if let Err(problem) = tracker.advance(carrier, steps, entered, bench, &mut log) {
             found.trouble.get_or_insert(Trouble::SubSteps(problem));
         }
@@ -260,6 +268,9 @@ fn go_on<const D: usize, M: Medium<D>>(
                     found.trouble.get_or_insert(Trouble::Position { id, step: steps.first });
                 }
                 flock.positions[axis][kept] = x;
+            }
+            if let Some(&mass) = flock.masses.get(first + lane) {
+                flock.masses[kept] = mass;
             }
             kept += 1;
         }

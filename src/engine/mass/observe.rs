@@ -8,11 +8,14 @@ use super::super::parallel;
 use super::super::program::unsound;
 use super::super::snapshot::{Row, Snapshot, Values};
 use super::book::Book;
+use super::fields::Binned;
 use super::flock::{self, Flock};
 use super::gate;
+use super::total::Total;
 use super::units::Units;
 use super::world::Site;
 use crate::maths::exact::{MOST_TERMS, Quanta, Sum};
+use crate::maths::wide::Width;
 use crate::plan::{Output, OutputKind, Station};
 use crate::state::grid::Grid;
 use crate::state::particles::CHUNK;
@@ -22,8 +25,13 @@ pub struct Scene<'a, const D: usize> {
     pub site: &'a Site<'a, D>,
     pub flocks: &'a [Flock<D>],
     pub units: &'a Units,
+    /// Mass that no particle exceeds, and sums of such.
+    pub heaviest: f64,
     pub quanta: Quanta,
     pub book: &'a Book,
+    pub width: Width,
+    /// What reactions have made and no particle carries yet, by population.
+    pub pending: &'a [f64],
 }
 
 impl<const D: usize> Scene<'_, D> {
@@ -45,6 +53,8 @@ impl<const D: usize> Scene<'_, D> {
                 }
                 _ => return Err(unsound("a place that nobody counts at")),
             },
+            OutputKind::Density => self.rows_of(output, |population| self.density(population))?,
+            OutputKind::Kernels => self.rows_of(output, |population| self.kernel_sizes(population))?,
             OutputKind::Covariance | OutputKind::Mixing => {
                 return Err(unsound("an output of fluid in a run of masses"));
             }
@@ -61,6 +71,14 @@ impl<const D: usize> Scene<'_, D> {
         Values::Rows(self.populations(output).into_iter().map(rows).collect())
     }
 
+    fn rows_of(
+        &self,
+        output: &Output,
+        rows: impl Fn(Option<usize>) -> Result<Vec<Row>, RunError>,
+    ) -> Result<Values, RunError> {
+        Ok(Values::Rows(self.populations(output).into_iter().map(rows).collect::<Result<_, _>>()?))
+    }
+
     fn binned(&self, output: &Output) -> Result<Values, RunError> {
         let grid = self.grid(output).ok_or_else(|| unsound("an output whose bins do not make a grid"))?;
         let bins = grid.bins();
@@ -75,10 +93,17 @@ impl<const D: usize> Scene<'_, D> {
                 population.map_or_else(|| vec![Cell::default(); grid.n_slots()], |p| self.sums(p, &grid));
             let retardation = population.map_or(1.0, |p| self.site.transport.populations[p].retardation);
             let per = |bin: usize| 1.0 / (porosity[bin] * retardation * volume);
+            n_particles.extend(sums[..grid.n_bins()].iter().map(|cell| cell.n));
+            if let (Some(population), true) = (population, self.has_kernels_in_bins()) {
+                let Binned { mean: own, standard_error: error } =
+                    self.kernels_in_bins(population, &grid, &porosity)?;
+                mean.push(own);
+                standard_error.push(error);
+                continue;
+            }
             mean.push((0..grid.n_bins()).map(|bin| sums[bin].mass.value() * per(bin)).collect());
             standard_error
                 .push((0..grid.n_bins()).map(|bin| sums[bin].square.value().sqrt() * per(bin)).collect());
-            n_particles.extend(sums[..grid.n_bins()].iter().map(|cell| cell.n));
         }
         Ok(Values::Binned { mean, standard_error, n_particles })
     }
@@ -90,7 +115,7 @@ impl<const D: usize> Scene<'_, D> {
         let n_groups = flocks.len().clamp(1, 16);
         let per_group = flocks.len().div_ceil(n_groups).max(1);
         let groups: Vec<&[&Flock<D>]> = flocks.chunks(per_group).collect();
-        let largest = self.units.largest();
+        let largest = self.heaviest;
         let square = Quanta::new(largest * largest, MOST_TERMS);
         let units = self.units.row(population);
         let partial = parallel::map(groups.len(), &|group| {
@@ -101,8 +126,9 @@ impl<const D: usize> Scene<'_, D> {
                     let range = first..(first + CHUNK).min(flock.len());
                     let positions = flock.positions.each_ref().map(|axis| &axis[range.clone()]);
                     grid.locate(positions, &mut slots[..range.len()]);
-                    for (slot, &id) in slots.iter().zip(&flock.ids[range]) {
-                        let mass = units[flock::origin(id)];
+                    let weights = flock.weights(units);
+                    for (slot, idx) in slots.iter().zip(range) {
+                        let mass = weights(idx);
                         let cell = &mut cells[*slot as usize];
                         self.quanta.add(&mut cell.mass, mass);
                         square.add(&mut cell.square, mass * mass);
@@ -129,6 +155,10 @@ impl<const D: usize> Scene<'_, D> {
 
     /// Mass of a population that is there.
     pub fn inside(&self, population: usize) -> f64 {
+        if let Some(pending) = self.pending.get(population) {
+            let own = self.flocks.iter().filter(|flock| flock.population == population);
+            return Total::of(own.flat_map(|flock| flock.masses.iter().copied()).chain([*pending]));
+        }
         let mut counts = vec![0_u64; self.units.n_origins()];
         for flock in self.flocks.iter().filter(|flock| flock.population == population) {
             flock.ids.iter().for_each(|&id| counts[flock::origin(id)] += 1);
@@ -151,9 +181,11 @@ impl<const D: usize> Scene<'_, D> {
             .collect();
         let column = |population: &Option<usize>| {
             list.iter()
-                .map(|&(id, flock, _)| {
-                    let own = self.flocks[flock].population;
-                    if Some(own) == *population { self.units.of(own, id) } else { 0.0 }
+                .map(|&(id, flock, idx)| {
+                    let flock = &self.flocks[flock];
+                    let own = flock.masses.get(idx).copied();
+                    let mass = || own.unwrap_or_else(|| self.units.of(flock.population, id));
+                    if Some(flock.population) == *population { mass() } else { 0.0 }
                 })
                 .collect()
         };

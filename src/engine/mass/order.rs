@@ -63,7 +63,8 @@ impl<const D: usize> Order<D> {
             };
             let ids = range.iter().map(|at| of(at).0.ids[of(at).1]).collect();
             let along = |axis: usize| range.iter().map(|at| of(at).0.positions[axis][of(at).1]).collect();
-            Flock { population, ids, positions: std::array::from_fn(along) }
+            let masses = range.iter().filter_map(|at| of(at).0.masses.get(of(at).1).copied()).collect();
+            Flock { population, ids, positions: std::array::from_fn(along), masses }
         })
     }
 

@@ -73,6 +73,17 @@ pub struct Window {
 }
 
 impl<const D: usize> Release<D> {
+    /// How many there will be in a run, about.
+    pub fn expected(&self) -> f64 {
+        match &self.kind {
+            Kind::Steady { n, .. } | Kind::Paced { n, .. } => *n as f64,
+            Kind::Held { course: Deep::Paced(pace), .. } => pace.total() / self.unit,
+            // In one step; how many there are does not show before.
+            Kind::Held { course: Deep::Even { per_step }, .. } => *per_step,
+            Kind::Filled { stride, .. } => *stride as f64,
+        }
+    }
+
     /// How many are there when the run begins.
     pub fn n_at_start(&self) -> u64 {
         match self.kind {

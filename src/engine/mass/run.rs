@@ -10,7 +10,7 @@ use super::super::parallel::Pool;
 use super::super::schedule::{Due, schedule};
 use super::super::snapshot::{Outcome, Snapshot};
 use super::super::track::fates::Chain;
-use super::super::track::medium::{Carrier, Medium};
+use super::super::track::medium::{Carrier, Medium, spread_at};
 use super::super::track::noise::Draws;
 use super::super::track::tracker::{Bench, Steps, Tracker};
 use super::super::track::walls::Ends;
@@ -21,6 +21,7 @@ use super::media::Media;
 use super::observe::Scene;
 use super::order::Order;
 use super::parts::Drafts;
+use super::reactions::{Reactions, Turn};
 use super::release::{Kind, Release};
 use super::units::Units;
 use super::world::Site;
@@ -59,6 +60,8 @@ pub struct Run<'a, const D: usize, M: Medium<D>> {
     pub last_displacements: Vec<u64>,
     /// Absent where it does not matter how particles lie in memory.
     order: Option<Order<D>>,
+    /// Reactions by kernels, if particles react so.
+    pub reactions: Option<Reactions<D>>,
     /// The number of the flow.
     pub period: usize,
 }
@@ -144,22 +147,24 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
         }
         let chain =
             site.transport.decay.as_ref().map(|decay| Chain::new(decay, &site.carriers(), site.plan.seed));
-        let releases = drafts.releases(site)?;
+        let mut releases = drafts.releases(site)?;
         let n_populations = site.transport.populations.len();
         let units = Units::new(&releases, n_populations, site.transport.decay.as_ref());
         let doors = releases.iter().map(|release| release.door).collect();
+        let reactions = Reactions::new(site, &mut releases, width)?;
         let n_doors = 1 + site.transport.sources.len() + 2 * D + site.transport.outlets().len();
+        let ways = chain.as_ref().map_or_else(Vec::new, Chain::ways);
+        let mut book = Book::new(units.clone(), doors, n_doors, n_populations, ways);
+        // Particles that are refilled count again and again; sums are over what happened, too.
+        let mut quanta = Quanta::new(units.largest(), MOST_TERMS);
+        if let Some(reactions) = &reactions {
+            quanta = reactions.quanta();
+            book = book.with_masses(quanta, n_populations);
+        }
         Ok(Self {
             carriers: site.carriers(),
-            book: Book::new(
-                units.clone(),
-                doors,
-                n_doors,
-                n_populations,
-                chain.as_ref().map_or_else(Vec::new, Chain::ways),
-            ),
-            // Particles that are refilled count again and again; sums are over what happened, too.
-            quanta: Quanta::new(units.largest(), MOST_TERMS),
+            book,
+            quanta,
             gates,
             stream: Stream::new(site.plan.seed, Purpose::Release),
             flocks: Vec::new(),
@@ -167,6 +172,7 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
             displacements: 0,
             last_displacements: Vec::new(),
             order: Order::new(site),
+            reactions,
             period: 0,
             site,
             tracker,
@@ -208,7 +214,7 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
     /// Steps that can be taken together from one: what fills a box again looks at every step.
     fn tile_length(&self) -> u64 {
         let fills = |release: &Release<D>| matches!(release.kind, Kind::Filled { .. });
-        if self.releases.iter().any(fills) { 1 } else { TILE }
+        if self.reactions.is_some() || self.releases.iter().any(fills) { 1 } else { TILE }
     }
 
     /// Takes everything through steps of equal length.
@@ -224,22 +230,42 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
 
     /// Takes everything through steps, or through a part of one.
     fn advance(&mut self, steps: Steps, part: f64) -> Result<(), RunError> {
+        let half = self.reactions.as_ref().is_some_and(|reactions| reactions.is_symmetric);
+        if half {
+            self.react((2 * steps.first, steps.first), (steps.t, 0.5 * steps.dt))?;
+        }
         self.empty_boxes(steps.t);
         let newborn = self.births(steps, part);
         self.move_flocks(steps)?;
         self.move_newborn(newborn, steps)?;
+        let span = if half { (steps.t + 0.5 * steps.dt, 0.5 * steps.dt) } else { (steps.t, steps.dt) };
+        self.react((2 * steps.first + 1, steps.first), span)?;
         flock::gather(&mut self.flocks);
         Ok(())
     }
 
+    /// Reactions by kernels over a time, in one of two turns of a step.
+    fn react(&mut self, (turn, step): (u64, u64), span: (f64, f64)) -> Result<(), RunError> {
+        let Some(reactions) = &mut self.reactions else { return Ok(()) };
+        let stock = (&mut self.flocks, &self.units, &mut self.book);
+        let (medium, carriers) = (&self.tracker.medium, &self.carriers);
+        let variances = |population: usize, at: [f64; D], dt: f64| {
+            std::array::from_fn(|axis| dt * spread_at(medium, &carriers[population], at, axis))
+        };
+        reactions.react(self.site, &variances, stock, (Turn { turn, step }, span.0, span.1))
+    }
+
     fn scene(&self) -> Scene<'_, D> {
-        Scene {
-            site: self.site,
-            flocks: &self.flocks,
-            units: &self.units,
-            quanta: self.quanta,
-            book: &self.book,
+        let (mut heaviest, mut quanta) = (self.units.largest(), self.quanta);
+        let mut pending: &[f64] = &[];
+        if let Some(reactions) = &self.reactions {
+            let masses = self.flocks.iter().flat_map(|flock| &flock.masses);
+            heaviest = masses.fold(heaviest, |most, &mass| most.max(mass));
+            (quanta, pending) = (Quanta::new(heaviest, MOST_TERMS), reactions.pending());
         }
+        let (site, flocks, units, book) = (self.site, &self.flocks[..], &self.units, &self.book);
+        let width = self.tracker.width;
+        Scene { site, flocks, units, heaviest, quanta, book, width, pending }
     }
 
     /// The outputs of a time; between two steps those of a copy that goes a part of the next one.
@@ -263,6 +289,7 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
         let chain = self.chain.clone();
         self.chain = chain.as_ref().map(|chain| chain.aside(plan.seed));
         let (flocks, book, displacements) = (self.flocks.clone(), self.book.clone(), self.displacements);
+        let reactions = self.reactions.clone();
         let steps = Steps {
             first: due.steps,
             end: due.steps + 1,
@@ -271,6 +298,7 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
         };
         let found = self.advance(steps, due.fraction).and_then(|()| self.look(due));
         (self.flocks, self.book, self.displacements) = (flocks, book, displacements);
+        self.reactions = reactions;
         (self.tracker.draws, self.tracker.planes, self.tracker.gaps) = (draws, planes, gaps);
         self.gates = gates;
         self.chain = chain;

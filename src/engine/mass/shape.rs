@@ -5,7 +5,7 @@
 
 use super::super::parallel;
 use super::super::snapshot::Row;
-use super::flock::{self, Flock};
+use super::flock::Flock;
 use super::observe::Scene;
 use crate::maths::exact::{MOST_TERMS, Quanta, Sum};
 use crate::maths::scalar::{exp, ln};
@@ -31,9 +31,8 @@ impl<const D: usize> Scene<'_, D> {
         let partial = parallel::map(groups.len(), &|group| {
             let mut sum = zero.clone();
             for flock in groups[group] {
-                for (idx, &id) in flock.ids.iter().enumerate() {
-                    add(&mut sum, units[flock::origin(id)], flock.position(idx));
-                }
+                let weights = flock.weights(units);
+                (0..flock.len()).for_each(|idx| add(&mut sum, weights(idx), flock.position(idx)));
             }
             sum
         });
@@ -43,7 +42,7 @@ impl<const D: usize> Scene<'_, D> {
     }
 
     fn largest(&self) -> f64 {
-        self.units.largest()
+        self.heaviest
     }
 
     /// Centre, then central moments around it, both by exact sums.

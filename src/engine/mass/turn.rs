@@ -55,7 +55,8 @@ fn go_on_turning<const D: usize, M: Medium<D>>(
         bench.fates.get_or_insert_with(Fates::new).states = [flock.population; LANES];
         let (events, turned) = (&mut found.events, &mut found.turned);
         let (units, n_ways) = (pass.units, pass.company.chain.n_ways());
-        let mut log = Log { population: flock.population, units, events, turned, n_ways };
+        let own = (&[][..], &[][..]);
+        let mut log = Log { population: flock.population, units, own, events, turned, n_ways };
         let result = pass.tracker.advance_turning(pass.company, pass.steps, pass.newborn, bench, &mut log);
         if let Err(problem) = result {
             found.trouble.get_or_insert(Trouble::SubSteps(problem));

@@ -145,7 +145,7 @@ impl<'a, const D: usize> Tally<'a, D> {
                 }
             }
             // Only particles that carry mass have it: a plan that asks for it is not run here.
-            OutputKind::FirstPassage => return None,
+            OutputKind::FirstPassage | OutputKind::Density | OutputKind::Kernels => return None,
         })
     }
 

@@ -101,7 +101,7 @@ impl<const D: usize> Run<'_, D> {
         let before = |k: usize| weighted(&|c| self.before[c].sum, k);
         let resting = |k: usize| self.reactions.immobile_before[k] * program.per_bin();
         rows[0][0] += total(program.plan.particles.count as f64, &before, &resting);
-        if program.plan.has_fluid_reactions() {
+        if program.plan.has_joint_reactions() {
             let added = &self.reactions.added;
             let made = total(0.0, &|k| added[k].sum, &|k| added[n + k].sum);
             rows.push([made.max(0.0), (-made).max(0.0)]);

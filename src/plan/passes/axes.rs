@@ -48,6 +48,7 @@ fn shows(output: &Output, axis_idx: usize) -> bool {
         OutputKind::Map | OutputKind::Particles | OutputKind::Moments | OutputKind::Dilution => true,
         // These need particles that carry mass, whose axes stay.
         OutputKind::Breakthrough | OutputKind::FirstPassage | OutputKind::Budget => true,
+        OutputKind::Density | OutputKind::Kernels => true,
         OutputKind::Profile | OutputKind::Covariance => output.bins[axis_idx] > 1,
         OutputKind::Total | OutputKind::Mixing => false,
     }

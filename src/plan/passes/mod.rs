@@ -5,6 +5,7 @@
 
 mod axes;
 mod exchange;
+mod kernels;
 mod network;
 mod order;
 mod outputs;
@@ -60,6 +61,8 @@ pub const PASSES: &[Pass] = &[
     Pass { name: "equal zones", run: zones::merge_equal, keeps_bytes: false },
     // After species: only what is carried can be derived from one another.
     Pass { name: "relations", run: relations::run, keeps_bytes: false },
+    // After reactions: what nothing reacts by, or is seen by, is not found.
+    Pass { name: "kernels", run: kernels::run, keeps_bytes: true },
     // After relations: what nobody carries nobody exchanges. Before axes, which an exchange needs all of.
     Pass { name: "exchange", run: exchange::run, keeps_bytes: true },
     // After relations: fewer fields, fewer gradients. Other particles are drawn: equal in law only.

@@ -23,6 +23,10 @@ pub(super) fn run(draft: &mut Draft) {
     if !draft.plan.carries_mass() {
         return;
     }
+    // So are their masses where they react.
+    if draft.plan.reacting().is_some() {
+        return;
+    }
     let Some(cells) = cells(&draft.plan) else { return };
     let n_axes = cells.len();
     let n_cells: usize = cells.iter().product();

@@ -10,7 +10,7 @@ use super::super::model::{MAX_PARTICLES, species_index};
 use super::super::scope::Origin;
 use super::super::{Particles, slot::Value};
 use super::{Auto, Shares};
-use crate::diagnostic::codes::{M001, M002, M004, M025};
+use crate::diagnostic::codes::{M001, M002, M004};
 use crate::diagnostic::{Diagnostic, precise};
 use crate::source::Span;
 use crate::syntax::tree::{self, BinaryOperator, Count, ExprKind};
@@ -205,7 +205,7 @@ pub fn auto<'a>(checker: &mut Checker<'a>, step: &'a tree::Expr) -> Option<Optio
 }
 
 fn criteria<'a>(checker: &mut Checker<'a>, arguments: &'a [tree::Argument]) -> Option<Auto> {
-    let mut found: [Option<(f64, Span)>; 2] = [None; 2];
+    let mut found: [Option<(f64, Span)>; 3] = [None; 3];
     let mut is_right = true;
     for argument in arguments {
         let ExprKind::Binary { operator, left, right } = &argument.value.kind else {
@@ -225,17 +225,7 @@ fn criteria<'a>(checker: &mut Checker<'a>, arguments: &'a [tree::Argument]) -> O
             is_right = false;
             continue;
         };
-        let Some(slot) = found.get_mut(which) else {
-            checker.report(
-                Diagnostic::error(M025, "steps cannot follow reactions yet")
-                    .at(name.span, "a criterion for reactions")
-                    .found("`reaction`")
-                    .expected("`courant <= …`, `dispersion <= …`")
-                    .help("leave it out"),
-            );
-            is_right = false;
-            continue;
-        };
+        let slot = &mut found[which];
         if let Some((_, first)) = slot.replace((0.0, name.span)) {
             checker.report(
                 Diagnostic::error(M002, format!("`{}` is given twice", name.value))
@@ -258,7 +248,8 @@ fn criteria<'a>(checker: &mut Checker<'a>, arguments: &'a [tree::Argument]) -> O
         found[which] = Some((value.value, name.span));
     }
     let value = |which: usize| found[which].map_or(DEFAULTS[which], |(value, _)| value);
-    is_right.then(|| Auto { courant: value(0), dispersion: value(1) })
+    let reaction = found[2].map(|(value, _)| value);
+    is_right.then(|| Auto { courant: value(0), dispersion: value(1), reaction })
 }
 
 fn report_criterion(checker: &mut Checker<'_>, span: Span) -> bool {
@@ -266,7 +257,7 @@ fn report_criterion(checker: &mut Checker<'_>, span: Span) -> bool {
         Diagnostic::error(M004, "this is no criterion for steps")
             .at(span, "not of the form `courant <= 0.5`")
             .found("something else")
-            .expected("`courant <= …`, `dispersion <= …`"),
+            .expected("`courant <= …`, `dispersion <= …`, `reaction <= …`"),
     );
     false
 }

@@ -197,4 +197,6 @@ pub enum Shares {
 pub struct Auto {
     pub courant: f64,
     pub dispersion: f64,
+    /// Bound of `|∇r · ν| Δt`; where there is none it is not asked for.
+    pub reaction: Option<f64>,
 }

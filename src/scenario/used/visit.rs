@@ -3,9 +3,9 @@
 //! Owns the walk. May use the tree. It deliberately knows no meaning: who visits says what to do.
 
 use crate::syntax::tree::{
-    Assignment, Average, Axis, Change, ChangeTimes, Count, DarcyEntry, DarcyKind, Dispersion, Expr, ExprKind,
-    Field, FileValue, FlowArgument, Name, Output, Place, Range, Rate, RegionArgument, Source, StatementKind,
-    SweepAxis, SweepEntry, SweepValue, Times,
+    Assignment, Average, Axis, Change, ChangeTimes, Count, DarcyEntry, DarcyKind, Dispersion, EstimateEntry,
+    EstimateValue, Expr, ExprKind, Field, FileValue, FlowArgument, Name, Output, Place, Range, Rate,
+    RegionArgument, Source, StatementKind, SweepAxis, SweepEntry, SweepValue, Times,
 };
 
 /// What is done at each place.
@@ -43,6 +43,7 @@ pub(super) fn visit(kind: &mut StatementKind, visitor: &mut impl Visitor) {
             expression(&mut it.value, visitor);
             expression(&mut it.support, visitor);
         }
+        StatementKind::Estimate(it) => it.entries.iter_mut().for_each(|it| estimate(it, visitor)),
         StatementKind::Domain(it) => {
             it.axes.iter_mut().for_each(|it| axis(it, visitor));
             it.frame.iter_mut().for_each(|it| expression(it, visitor));
@@ -83,6 +84,14 @@ pub(super) fn visit(kind: &mut StatementKind, visitor: &mut impl Visitor) {
         | StatementKind::Data(_)
         | StatementKind::Use(_)
         | StatementKind::Report(_) => {}
+    }
+}
+
+fn estimate(it: &mut EstimateEntry, visitor: &mut impl Visitor) {
+    match &mut it.value {
+        EstimateValue::One(it) => expression(it, visitor),
+        EstimateValue::Range(it) => range(it, visitor),
+        EstimateValue::Counts(list) => expressions(list, visitor),
     }
 }
 

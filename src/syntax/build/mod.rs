@@ -6,6 +6,7 @@
 
 mod data;
 mod expressions;
+mod kernels;
 mod quantity;
 mod statements;
 mod sweeps;

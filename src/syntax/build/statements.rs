@@ -4,6 +4,7 @@
 //! It deliberately resolves no name; clauses in free order are counted, nothing else is checked.
 
 use super::expressions::{bare_number, operand};
+use super::kernels::estimate;
 use super::{Parts, Place, data, span_at, spanned, sweeps, transport};
 use crate::diagnostic::{Diagnostic, codes};
 use crate::source::{Span, Spanned};
@@ -47,7 +48,10 @@ pub fn kind(mut parts: Parts, rule: Rule) -> Built<StatementKind> {
         Rule::source => S::Source(transport::source(parts)?),
         Rule::mixing => S::MixingZones(each(parts, Rule::zone, zone)?),
         Rule::exchange => S::Exchange(each(parts, Rule::exchange_setting, field)?),
-        Rule::kernel => S::Kernel(kernel(parts)?),
+        Rule::kernel => match parts.take(Rule::estimate) {
+            Some(pair) => S::Estimate(estimate(&mut Parts::of(parts.place, pair))?),
+            None => S::Kernel(kernel(parts)?),
+        },
         Rule::average => S::Average(average(parts)?),
         Rule::initial => S::Initial(each(parts, Rule::assignment, assignment)?),
         Rule::particles => S::Particles(particles(parts)?),
@@ -262,7 +266,7 @@ pub fn counts(parts: &mut Parts) -> Built<Vec<Expr>> {
 }
 
 /// A bare number, or a name.
-fn count(place: Place, pair: Pair<Rule>) -> Built<Expr> {
+pub fn count(place: Place, pair: Pair<Rule>) -> Built<Expr> {
     let mut inner = Parts::of(place, pair);
     match inner.take(Rule::bare_number) {
         Some(number) => bare_number(place, number),

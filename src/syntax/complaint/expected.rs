@@ -81,6 +81,13 @@ pub fn literal(rule: Rule) -> Option<&'static str> {
 pub fn expected_words(rule: Rule) -> Vec<String> {
     use Rule as R;
     let one = |word: &str| vec![word.to_owned()];
+    let is_of_darcy = matches!(
+        rule,
+        R::head | R::flux | R::no_flow | R::periodic | R::conductivity | R::anisotropy | R::well | R::cells
+    );
+    if is_of_darcy {
+        return one("an entry such as `head left 1 m`");
+    }
     match rule {
         R::EOI => one(END),
         R::expression | R::prefix | R::number | R::conditional | R::call | R::path | R::tuple => one(VALUE),
@@ -92,6 +99,8 @@ pub fn expected_words(rule: Rule) -> Vec<String> {
         R::reactants | R::products | R::target_kind | R::share => one("a name"),
         R::kind | R::output_kind | R::shape | R::boundary_kind => one("a kind"),
         R::setting | R::chemistry_setting | R::exchange_setting | R::average_part => one("a setting"),
+        R::estimate => one("a kernel such as `gaussian adaptive`"),
+        R::estimate_entry => one("an entry such as `grid 0.5 m`"),
         R::rate | R::signed_number | R::corner | R::region_argument | R::sweep_value | R::progression => {
             one(VALUE)
         }
@@ -103,21 +112,13 @@ pub fn expected_words(rule: Rule) -> Vec<String> {
         R::qualifier | R::placement | R::charge_word | R::ion_size_word => one("a further word"),
         R::coefficient => one("a number"),
         R::text => one("a text in quotes"),
-        R::bare_number | R::count | R::counts => one("a number"),
+        R::bare_number | R::count | R::counts | R::grid_counts => one("a number"),
         R::unit => one("a unit"),
         R::axis_name | R::axis | R::patch => ["`x`", "`y`", "`z`"].map(str::to_owned).to_vec(),
         R::side => one("a side such as `left`"),
         R::arrow => one("`->`"),
         R::rate_sign => one("`@`"),
         R::dots => one("`..`"),
-        R::head
-        | R::flux
-        | R::no_flow
-        | R::periodic
-        | R::conductivity
-        | R::anisotropy
-        | R::well
-        | R::cells => one("an entry such as `head left 1 m`"),
         R::side_value => one("a side such as `left`"),
         R::darcy => one("`{`"),
         R::file_unit => one("a unit in brackets, such as `[m]`"),

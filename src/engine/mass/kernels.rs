@@ -1,0 +1,176 @@
+//! Kernels of populations: found from the particles that are there.
+//!
+//! Owns the lattice of a population and the search for its kernels. May use `density` and the plan. It deliberately moves
+//! nothing.
+
+use super::super::density::{
+    Adaptive, Cell, End, Global, Lattice, Projection, Shape, Tally, Variant, estimate, global, histogram,
+};
+use super::super::density::{Rule as DensityRule, Weighing as DensityWeighing};
+use super::super::error::RunError;
+use super::super::program::unsound;
+use super::flock::Flock;
+use super::world::Site;
+use crate::maths::vector::pow;
+use crate::maths::wide::Width;
+use crate::plan::kernels::{Kernels, Manner, Rule, Weighing};
+use crate::plan::transport::SideRule;
+
+/// Particles that a kernel should hold which reacts.
+const FEWEST: f64 = 8.0;
+
+/// Where and how kernels of one population are found.
+#[derive(Debug, Clone)]
+pub struct Finder {
+    pub lattice: Lattice,
+    low: Vec<f64>,
+    kernels: Kernels,
+    width: Width,
+}
+
+/// Kernels, and the density that they give.
+pub struct Found {
+    pub projection: Projection,
+    /// Mass per m^d and its standard error, by cell of the lattice.
+    pub density: Vec<f64>,
+    pub standard_error: Vec<f64>,
+    pub tally: Tally,
+    /// Cells with kernels of their own, in the order of the tally; else one kernel for all, m.
+    pub cells: Vec<Cell>,
+    pub one: [f64; 3],
+    pub n_loops: usize,
+}
+
+impl Finder {
+    pub fn new<const D: usize>(site: &Site<D>, population: usize, width: Width) -> Result<Self, RunError> {
+        let kernels = site.plan.kernels.clone().ok_or_else(|| unsound("no kernels"))?;
+        let is_mobile = site.transport.populations[population].is_mobile;
+        let axis = |axis: usize| {
+            let n = kernels.cells[axis];
+            (n, (site.high[axis] - site.low[axis]) / n as f64, ends(site, axis, is_mobile))
+        };
+        let axes: Vec<(usize, f64, [End; 2])> = (0..D).map(axis).collect();
+        let lattice = Lattice::new(&axes).ok_or_else(|| unsound("cells of kernels that are none"))?;
+        Ok(Self { lattice, low: site.low.to_vec(), kernels, width })
+    }
+
+    /// Kernels of particles where they are.
+    pub fn find<const D: usize>(
+        &self,
+        flocks: &[&Flock<D>],
+        units: &[f64],
+        start: Option<f64>,
+    ) -> Result<Found, RunError> {
+        let n: usize = flocks.iter().map(|flock| flock.len()).sum();
+        let mut positions: [Vec<f64>; D] = std::array::from_fn(|_| Vec::with_capacity(n));
+        let mut masses = Vec::with_capacity(n);
+        for flock in flocks {
+            positions.iter_mut().zip(&flock.positions).for_each(|(all, own)| all.extend_from_slice(own));
+            let weights = flock.weights(units);
+            masses.extend((0..flock.len()).map(weights));
+        }
+        let positions = positions.each_ref().map(|axis| &axis[..]);
+        let tally = Tally::of(&self.lattice, &self.low, &positions, Some(&masses));
+        match self.kernels.manner {
+            Manner::Adaptive => Ok(self.adaptive(tally, start)),
+            Manner::Global | Manner::Fixed => self.one(tally),
+            Manner::Histogram | Manner::Collocation => {
+                let (density, standard_error) = histogram(&self.lattice, &tally);
+                let projection = Projection::of_cells(self.lattice.clone(), self.width);
+                let (cells, one) = (Vec::new(), [0.0; 3]);
+                Ok(Found { projection, density, standard_error, tally, cells, one, n_loops: 0 })
+            }
+        }
+    }
+
+    fn adaptive(&self, tally: Tally, start: Option<f64>) -> Found {
+        let kernels = &self.kernels;
+        let adaptive = Adaptive {
+            variant: Variant::Corrected,
+            shape: shape(kernels),
+            start: start.map_or_else(Default::default, super::super::density::Start::Bandwidth),
+            weighing: weighing(kernels.weighing),
+            bounds: kernels.bandwidth,
+            is_fast: true,
+            tolerance: kernels.tolerance,
+            most_loops: kernels.loops as usize,
+        };
+        let found = estimate(&self.lattice, &tally, &adaptive, self.width);
+        let part = |cell: &Cell| self.part(cell.h, cell.rho);
+        let projection = Projection::of_estimate(self.lattice.clone(), &found, part, self.width);
+        let n_loops = found.history.len().saturating_sub(1);
+        let (density, standard_error, cells) = (found.density, found.standard_error, found.cells);
+        Found { projection, density, standard_error, tally, cells, one: [0.0; 3], n_loops }
+    }
+
+    /// How much narrower kernels are that react than those that densities are shown by.
+    ///
+    /// - Equation: `p = min(1, max(γ, h_M/h))`, `ρ (2√π h_M)^d = M`.
+    /// - Symbols: `h` best bandwidth for the density, `ρ` particles per m^d, `γ` of the plan, `M` particles that a kernel should
+    ///   hold, by the variance of what it sums.
+    /// - Range: up to one.
+    /// - Source: docs/methods.md: smoothing makes reactants meet that do not, by `h²`, step after step; noise does not add up so.
+    /// - Shape: one number.
+    fn part(&self, h: f64, rho: f64) -> f64 {
+        let d = self.lattice.d as f64;
+        let few = pow(FEWEST / rho, 1.0 / d) / (2.0 * std::f64::consts::PI.sqrt());
+        self.kernels.narrowing.max(few / h).min(1.0)
+    }
+
+    fn one(&self, tally: Tally) -> Result<Found, RunError> {
+        let kernels = &self.kernels;
+        let rule = match (kernels.manner, kernels.bandwidth) {
+            (Manner::Fixed, Some([h, _])) => DensityRule::Fixed(h),
+            _ => match kernels.rule {
+                Rule::NormalReference => DensityRule::NormalReference,
+                Rule::Botev if self.lattice.d == 1 => DensityRule::Botev,
+                Rule::PlugIn | Rule::Botev => DensityRule::PlugIn(shape(kernels)),
+            },
+        };
+        let found = global(&self.lattice, &tally, rule, weighing(kernels.weighing), self.width);
+        let Global { mut bandwidths, density, standard_error, n_loops, .. } =
+            found.map_err(|trouble| unsound(&trouble.to_string()))?;
+        if let (Some([low, high]), Manner::Global) = (kernels.bandwidth, kernels.manner) {
+            bandwidths.iter_mut().filter(|h| **h > 0.0).for_each(|h| *h = h.clamp(low, high));
+        }
+        let own: Vec<f64> = bandwidths.iter().copied().filter(|h| *h > 0.0).collect();
+        let mean = pow(own.iter().product(), 1.0 / own.len().max(1) as f64);
+        let (sum, squares) =
+            density.iter().fold((0.0, 0.0), |(sum, squares), own| (sum + own, squares + own * own));
+        let part = match kernels.manner {
+            Manner::Fixed => 1.0,
+            _ => self.part(mean, squares / sum * tally.effective() / tally.mass()),
+        };
+        let projection = Projection::of_one(self.lattice.clone(), bandwidths.map(|h| part * h), self.width);
+        Ok(Found { projection, density, standard_error, tally, cells: Vec::new(), one: bandwidths, n_loops })
+    }
+}
+
+fn shape(kernels: &Kernels) -> Shape {
+    if kernels.is_stretched { Shape::Stretched } else { Shape::Round }
+}
+
+fn weighing(of: Weighing) -> DensityWeighing {
+    match of {
+        Weighing::OfAll => DensityWeighing::OfAll,
+        Weighing::Mean => DensityWeighing::Mean,
+        Weighing::Number => DensityWeighing::Number,
+        Weighing::OfCell => DensityWeighing::OfCell,
+    }
+}
+
+/// What the ends of an axis are to kernels. What rests meets no side.
+fn ends<const D: usize>(site: &Site<D>, axis: usize, is_mobile: bool) -> [End; 2] {
+    let sides = &site.transport.sides[axis];
+    let is = |end: usize, rule: fn(&SideRule) -> bool| sides[end].iter().any(|patch| rule(&patch.rule));
+    let is_periodic = |rule: &SideRule| *rule == SideRule::Periodic;
+    if is(0, is_periodic) || is(1, is_periodic) {
+        return [End::Wrap; 2];
+    }
+    let end = |end: usize| {
+        // A side that absorbs in parts has none of its own sign.
+        let absorbs = sides[end].iter().all(|patch| patch.rule == SideRule::Absorb);
+        if absorbs && is_mobile { End::Sink } else { End::Mirror }
+    };
+    [end(0), end(1)]
+}
