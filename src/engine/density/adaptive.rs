@@ -8,8 +8,10 @@ use super::classes::{Fill, Table, bandwidth_of, class_of};
 use super::curvature::{Curvatures, curvatures};
 use super::frame::Frame;
 use super::global::histogram;
+use super::kinds::{Adaptive, Cell, Estimate, Start};
 use super::lattice::{AXES, Field, Lattice, Window};
 use super::limits::{GROWTH, Limits};
+use super::local::Basis;
 use super::smoothed::Smoothed;
 use super::stencil::scatter;
 use super::tally::{Tally, Weighing};
@@ -19,121 +21,16 @@ use crate::maths::wide::Width;
 use std::f64::consts::PI;
 
 /// Cells that a thread takes at once.
-const PORTION: usize = 64;
+pub(super) const PORTION: usize = 64;
 
 /// From this loop on the running mean of the error may end the iteration.
 const RUNNING: usize = 8;
 
-/// Which formulas are taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Variant {
-    /// As published: curvatures without a mean and with the right square, shapes that are least rough.
-    #[default]
-    Corrected,
-    /// As in the released program, with its defects, to compare.
-    Released,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Shape {
-    /// Kernels may be longer along one axis than along another.
-    #[default]
-    Stretched,
-    Round,
-}
-
-/// The bandwidths of the first loop.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub enum Start {
-    /// That of a normal density with the cloud's standard deviations.
-    #[default]
-    NormalReference,
-    /// So much of it.
-    Times(f64),
-    /// m
-    Bandwidth(f64),
-}
-
-/// How kernels are found.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Adaptive {
-    pub variant: Variant,
-    pub shape: Shape,
-    pub start: Start,
-    pub weighing: Weighing,
-    /// Bounds of all bandwidths, m.
-    pub bounds: Option<[f64; 2]>,
-    /// Wide kernels are summed on coarse cells.
-    pub is_fast: bool,
-    /// Relative change of a loop that ends the iteration; zero for never.
-    pub tolerance: f64,
-    pub most_loops: usize,
-}
-
-impl Default for Adaptive {
-    fn default() -> Self {
-        Self {
-            variant: Variant::default(),
-            shape: Shape::default(),
-            start: Start::default(),
-            weighing: Weighing::default(),
-            bounds: None,
-            is_fast: true,
-            tolerance: 0.02,
-            most_loops: 20,
-        }
-    }
-}
-
-/// What is known of a cell with particles.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Cell {
-    pub at: [usize; AXES],
-    /// Bandwidth, m: the geometric mean of those along axes.
-    pub h: f64,
-    /// Bandwidths over it.
-    pub s: [f64; AXES],
-    /// Width of the support within which errors are weighed, m.
-    pub sigma: f64,
-    /// Bandwidths of curvatures, m.
-    pub g: [f64; AXES],
-    /// Classes of bandwidths, where they are rounded.
-    pub h_class: [i64; AXES],
-    pub g_class: [i64; AXES],
-    /// Density, and its mean over the support; counts per m^d.
-    pub rho: f64,
-    pub n: f64,
-    /// Net roughness Λ, and locally averaged products of curvatures, by rows of the lower triangle.
-    pub roughness: f64,
-    pub psi: [f64; 6],
-}
-
-/// A density, and how it was found.
-#[derive(Debug, Clone)]
-pub struct Estimate {
-    /// Mass per m^d, by cell of the lattice, and its standard error by the numbers of particles.
-    pub density: Vec<f64>,
-    pub standard_error: Vec<f64>,
-    /// By cell with particles, in the order of the tally.
-    pub cells: Vec<Cell>,
-    /// Mean bandwidth over cells with particles after each loop, m, that of the start first.
-    pub history: Vec<f64>,
-    /// Whether the last loop changed less than the tolerance.
-    pub is_settled: bool,
-}
-
-impl Estimate {
-    /// Of particles whose masses are not finite and above zero.
-    fn unknown(lattice: &Lattice) -> Self {
-        let none = vec![f64::NAN; lattice.n_cells()];
-        let (density, standard_error) = (none.clone(), none);
-        Self { density, standard_error, cells: Vec::new(), history: vec![f64::NAN], is_settled: false }
-    }
-}
-
 pub(super) struct Search<'a> {
     pub(super) lattice: &'a Lattice,
     pub(super) adaptive: &'a Adaptive,
+    /// Whether kernels have axes of their own.
+    pub(super) is_oriented: bool,
     pub(super) limits: Limits,
     pub(super) integral: Integral,
     pub(super) width: Width,
@@ -164,8 +61,7 @@ impl Constants {
 
 /// The density of particles that are counted on a lattice.
 pub fn estimate(lattice: &Lattice, tally: &Tally, adaptive: &Adaptive, width: Width) -> Estimate {
-    let takes_cells = adaptive.shape == Shape::Stretched && adaptive.variant == Variant::Corrected;
-    let frame = Frame::new(lattice, tally, takes_cells);
+    let frame = Frame::new(lattice, tally, adaptive.takes_cells());
     if frame.is_point() {
         let (density, standard_error) = histogram(lattice, tally);
         return Estimate { density, standard_error, cells: Vec::new(), history: vec![0.0], is_settled: true };
@@ -183,19 +79,25 @@ pub fn estimate(lattice: &Lattice, tally: &Tally, adaptive: &Adaptive, width: Wi
             *limit = bounds.map(|bound| (bound / scale).clamp(limit[0], limit[1]));
         }
     }
-    frame.restore(solve(own_lattice, own_tally, (&own, limits), width))
+    // On a line there is one direction.
+    let is_oriented = adaptive.is_oriented() && own_lattice.d > 1;
+    let n_bases = if is_oriented { tally.cells.len() } else { 0 };
+    let bases: Vec<(Basis, bool)> = (0..n_bases).map(|idx| adaptive.orientation.basis(idx, &frame)).collect();
+    let found = solve((own_lattice, own_tally), (&own, limits), is_oriented.then_some(&bases), width);
+    frame.restore(found, is_oriented)
 }
 
 fn solve(
-    lattice: &Lattice,
-    tally: &Tally,
+    (lattice, tally): (&Lattice, &Tally),
     (adaptive, limits): (&Adaptive, Limits),
+    bases: Option<&Vec<(Basis, bool)>>,
     width: Width,
 ) -> Estimate {
     let (counts, unit) = tally.pseudo_counts(adaptive.weighing);
     let mut search = Search {
         lattice,
         adaptive,
+        is_oriented: bases.is_some(),
         limits,
         integral: Integral::new(),
         width,
@@ -208,7 +110,7 @@ fn solve(
     if search.counts.iter().any(|count| !(count.is_finite() && *count > 0.0)) {
         return Estimate::unknown(lattice);
     }
-    search.begin(tally);
+    search.begin(tally, bases);
     let mut history = vec![search.mean_bandwidth()];
     let mut ends = Ends::default();
     let mut is_settled = false;
@@ -225,7 +127,7 @@ fn solve(
 }
 
 impl Search<'_> {
-    fn begin(&mut self, tally: &Tally) {
+    fn begin(&mut self, tally: &Tally, bases: Option<&Vec<(Basis, bool)>>) {
         let (lattice, d) = (self.lattice, self.d);
         let deviations = tally.deviations();
         let n: f64 = self.counts.iter().sum();
@@ -239,11 +141,16 @@ impl Search<'_> {
         };
         let cell = |&idx: &u32| {
             let sigma = (2.0 * h).clamp(self.limits.support[0], self.limits.support[1]);
-            let mut cell = Cell { at: lattice.cell(idx as usize), sigma, ..Cell::default() };
-            self.limit(&mut cell, [h; AXES]);
+            let mut cell = Cell { at: lattice.cell(idx as usize), sigma, h, ..Cell::default() };
+            if bases.is_none() {
+                self.limit(&mut cell, [h; AXES]);
+            }
             cell
         };
         self.cells = tally.cells.iter().map(cell).collect();
+        if let Some(bases) = bases {
+            self.turn(bases);
+        }
         if !self.cells.is_empty() {
             self.spread();
         }
@@ -255,6 +162,9 @@ impl Search<'_> {
 
     /// Bandwidths along axes within their bounds, and what follows from them.
     fn limit(&self, cell: &mut Cell, h: [f64; AXES]) {
+        if self.is_oriented {
+            return self.limit_along(cell, h);
+        }
         let smallest = self.lattice.smallest();
         let mut product = 1.0;
         let mut own = [1.0; AXES];
@@ -298,6 +208,18 @@ impl Search<'_> {
             search.choose_curvature(cell);
         });
         drop(rho);
+        if self.is_oriented {
+            self.average_along();
+        } else {
+            self.average(tools);
+        }
+        self.for_all(&|search, cell, _| search.choose(cell));
+        self.fill_smooth();
+        self.spread();
+    }
+
+    /// Locally averaged products of curvatures along axes.
+    fn average(&mut self, tools: (&Lattice, Integral, Width)) {
         let settings = (self.adaptive.variant, self.adaptive.is_fast);
         let Curvatures { window, fields } = curvatures(tools, settings, &self.cells, &self.counts);
         let range = self.widths();
@@ -311,19 +233,19 @@ impl Search<'_> {
                 place += 1;
             }
         }
-        self.for_all(&|search, cell, _| search.choose(cell));
-        self.fill_smooth();
-        self.spread();
     }
 
     /// Supports: the narrowest and the widest, m.
-    fn widths(&self) -> (f64, f64) {
+    pub(super) fn widths(&self) -> (f64, f64) {
         let sigmas = || self.cells.iter().map(|cell| cell.sigma);
         (sigmas().fold(f64::INFINITY, f64::min), sigmas().fold(0.0, f64::max))
     }
 
     /// Fine cells that kernels reach.
     fn reach(&self) -> [usize; AXES] {
+        if self.is_oriented {
+            return self.reach_along();
+        }
         let mut most = [0.0_f64; AXES];
         for cell in &self.cells {
             for axis in self.lattice.axes() {
@@ -362,6 +284,9 @@ impl Search<'_> {
 
     /// `ρ = Σ_b c_b W_b/V_c` on a window, or `Σ_b c_b W_b²/V_c²`.
     fn density_of(&self, counts: &[f64], window: &Window, is_squared: bool) -> Field {
+        if self.is_oriented {
+            return self.density_along(counts, window, is_squared);
+        }
         let lattice = self.lattice;
         let mut fields = [Field::zeros(window, [1; AXES])];
         let volume = lattice.volume();

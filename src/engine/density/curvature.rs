@@ -2,7 +2,7 @@
 //!
 //! Owns these fields. May use stencils. It deliberately chooses no bandwidth.
 
-use super::adaptive::{Cell, Variant};
+use super::kinds::{Cell, Variant};
 use super::bands::{Band, smooth};
 use super::classes::{Fill, Table};
 use super::lattice::{AXES, Field, Lattice, Window};

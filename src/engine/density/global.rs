@@ -3,7 +3,7 @@
 //! Owns the rules by which that size is found. May use spectra, limits and bands. It deliberately lets kernels differ along
 //! axes, but nowhere else.
 
-use super::adaptive::Shape;
+use super::kinds::Shape;
 use super::bands::{Band, smooth};
 use super::frame::Frame;
 use super::lattice::{AXES, Field, Lattice, Window};

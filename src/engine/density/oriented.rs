@@ -1,0 +1,254 @@
+//! Kernels along directions: the parts of the iteration that differ from those of kernels along the axes of the lattice.
+//!
+//! Owns their bounds, their sums, and curvatures along directions from those along axes. May use ellipses, patches and ladders.
+//! It deliberately follows the same formulas: those of a cell are on the axes of its kernel.
+
+use super::super::parallel;
+use super::adaptive::{PORTION, Search};
+use super::bands::{Band, smooth};
+use super::ellipse::Ellipse;
+use super::kinds::Cell;
+use super::ladder::blended;
+use super::lattice::{AXES, End, Field, Lattice, Window};
+use super::local::{Basis, bound};
+use super::patch::{fold, scatter};
+use super::smoothed::Smoothed;
+use super::taps::Taps;
+use crate::maths::vector::{exp, ln, pow};
+
+/// Cells that differences take to each side; those of order six, first and second.
+const DIFFERENCES: usize = 3;
+const FIRST: [f64; 7] = [-1.0 / 60.0, 0.15, -0.75, 0.0, 0.75, -0.15, 1.0 / 60.0];
+const SECOND: [f64; 7] = [1.0 / 90.0, -0.15, 1.5, -49.0 / 18.0, 1.5, -0.15, 1.0 / 90.0];
+
+/// Cells of which a bandwidth of curvatures has at least so many.
+const LEAST: f64 = 0.8;
+
+/// Averages of products with the narrower and the wider of two supports, by rows of the lower triangle, and where between them.
+type Between = ([[f64; 6]; 2], f64);
+
+impl Search<'_> {
+    /// Axes of all kernels, and bandwidths for a start: as many cells along each.
+    pub(super) fn turn(&mut self, bases: &[(Basis, bool)]) {
+        let mut cells = std::mem::take(&mut self.cells);
+        for (cell, (basis, is_stagnant)) in cells.iter_mut().zip(bases) {
+            (cell.axes, cell.is_stagnant) = (*basis, *is_stagnant);
+            let h = cell.h;
+            let size = |axis: &[f64; AXES]| axis.iter().map(|part| part * part).sum::<f64>().sqrt();
+            let all: f64 = self.lattice.axes().map(|k| size(&basis[k])).product();
+            let mean = pow(all, 1.0 / self.d);
+            let wanted = basis.map(|axis| if *is_stagnant { h } else { h * mean / size(&axis) });
+            self.limit_along(cell, wanted);
+        }
+        self.cells = cells;
+    }
+
+    /// Bandwidths along the axes of a kernel within their bounds, and what follows from them.
+    pub(super) fn limit_along(&self, cell: &mut Cell, h: [f64; AXES]) {
+        let bounds = self.bounds_along(cell, |i| self.limits.kernel[i]);
+        let (mut product, mut own) = (1.0, [1.0; AXES]);
+        for k in self.lattice.axes() {
+            own[k] = h[k].min(bounds[k][1]).max(bounds[k][0]);
+            product *= own[k];
+        }
+        cell.h = pow(product, 1.0 / self.d);
+        cell.s = [1.0; AXES];
+        self.lattice.axes().filter(|_| !cell.is_stagnant).for_each(|k| cell.s[k] = own[k] / cell.h);
+    }
+
+    /// Lower and upper bounds along the axes of a kernel; of one that is round the same.
+    fn bounds_along(&self, cell: &Cell, of: impl Fn(usize) -> [f64; 2]) -> [[f64; 2]; AXES] {
+        let used = self.lattice.axes();
+        let own = |k: usize| [0, 1].map(|side| bound(cell.axes[k], |i| of(i)[side], used.clone()));
+        let mut bounds = [[0.0, f64::INFINITY]; AXES];
+        used.clone().for_each(|k| bounds[k] = own(k));
+        if cell.is_stagnant {
+            let of_all = bounds[used]
+                .iter()
+                .fold([0.0_f64, f64::INFINITY], |all, own| [all[0].max(own[0]), all[1].min(own[1])]);
+            bounds = [of_all; AXES];
+        }
+        bounds
+    }
+
+    /// Bandwidths of curvatures along the axes of a kernel: its own ones, all by the same factor.
+    ///
+    /// - Equation: `g_k = α N_v^β h s_k`
+    /// - Symbols: as for those along axes of the lattice, of which this is the one of a round kernel.
+    /// - Range: within bounds.
+    /// - Source: methods, (4.3), where lengths are counted in bandwidths: there every cloud is round. All second derivatives
+    ///   are then of one kernel, and those along any axes follow from those along others.
+    /// - Shape: one per axis of the kernel.
+    pub(super) fn choose_curvature_along(&self, cell: &mut Cell, common: f64) {
+        let wanted = cell.s.map(|s| exp(common + ln(s)));
+        let bounds = self.bounds_along(cell, |i| {
+            let [_, high] = self.limits.curvature_along[i];
+            [LEAST * self.lattice.edge[i], high]
+        });
+        cell.g = [0.0; AXES];
+        self.lattice.axes().for_each(|k| cell.g[k] = wanted[k].min(bounds[k][1]).max(bounds[k][0]));
+    }
+
+    fn kernel(&self, cell: &Cell) -> Ellipse {
+        let widths = cell.s.map(|s| cell.h * s);
+        Ellipse::new(self.lattice.d, (&cell.axes, widths, self.lattice.edge), false)
+    }
+
+    fn curvature(&self, cell: &Cell) -> Ellipse {
+        Ellipse::new(self.lattice.d, (&cell.axes, cell.g, self.lattice.edge), true)
+    }
+
+    /// Cells that kernels reach along each axis of the lattice, and how many one has at most.
+    fn most(&self, of: impl Fn(&Cell) -> Ellipse) -> ([usize; AXES], usize) {
+        let mut most = ([0; AXES], 0);
+        for ellipse in self.cells.iter().map(of) {
+            let reach = ellipse.reach.map(isize::unsigned_abs);
+            (0..AXES).for_each(|axis| most.0[axis] = most.0[axis].max(reach[axis]));
+            most.1 = most.1.max(ellipse.n_cells());
+        }
+        most
+    }
+
+    pub(super) fn reach_along(&self) -> [usize; AXES] {
+        self.most(|cell| self.kernel(cell)).0
+    }
+
+    /// `ρ = Σ_b c_b W_b/V_c` on a window, or `Σ_b c_b W_b²/V_c²`.
+    pub(super) fn density_along(&self, counts: &[f64], window: &Window, is_squared: bool) -> Field {
+        let volume = self.lattice.volume();
+        let volume = if is_squared { volume * volume } else { volume };
+        let mut field = Field::zeros(window, [1; AXES]);
+        let (_, most) = self.most(|cell| self.kernel(cell));
+        scatter((self.cells.len(), most), &mut field, self.width, &|idx, patch| {
+            let cell = &self.cells[idx];
+            let place = (cell.at, &self.kernel(cell));
+            patch.fill(self.lattice, place, (counts[idx] / volume, is_squared), self.width);
+        });
+        field
+    }
+
+    /// All second derivatives of a density with wider kernels, by rows of the lower triangle.
+    ///
+    /// - Equation: `H_ij = D_i D_j Σ_b c_b W_b/V_c`, with `D_i D_i` the second difference.
+    /// - Symbols: `W_b` with the bandwidths of curvatures, `D` differences of seven cells.
+    /// - Range: bandwidths of at least 0.8 cells, of which differences see derivatives to some per cent.
+    /// - Source: derivatives of a sum of kernels are the sum of theirs; sums over all cells are 0 and sums of squares those of
+    ///   integrals, as (A.3) and (A.4) of the methods want them.
+    /// - Shape: one field each.
+    fn curvatures_along(&self) -> (Window, Vec<Field>) {
+        let (lattice, volume) = (self.lattice, self.lattice.volume());
+        let (reach, most) = self.most(|cell| self.curvature(cell));
+        let cells = self.cells.iter().map(|cell| cell.at);
+        let window = Window::around(lattice, cells, reach.map(|reach| reach + DIFFERENCES));
+        let mut field = Field::zeros(&window, [1; AXES]);
+        scatter((self.cells.len(), most), &mut field, self.width, &|idx, patch| {
+            let cell = &self.cells[idx];
+            let place = (cell.at, &self.curvature(cell));
+            patch.fill(lattice, place, (self.counts[idx] / volume, false), self.width);
+        });
+        let of = |(i, j): (usize, usize)| {
+            let mut own = field.clone();
+            if i == j {
+                smooth(&mut own, i, &difference(lattice, i, &SECOND), self.width);
+            } else {
+                smooth(&mut own, i, &difference(lattice, i, &FIRST), self.width);
+                smooth(&mut own, j, &difference(lattice, j, &FIRST), self.width);
+            }
+            let per = 1.0 / (lattice.edge[i] * lattice.edge[j]);
+            own.values.iter_mut().for_each(|value| *value *= per);
+            own
+        };
+        (window, pairs(lattice.d).map(of).collect())
+    }
+
+    /// Locally averaged products of curvatures along the axes of the kernel of each cell.
+    ///
+    /// - Equation: `ψ_kl = Σ_PQ e_kP e_lQ ⟨H_P H_Q⟩`, `e_kP = e_ki e_kj`, twice that for i ≠ j.
+    /// - Symbols: `H_P` second derivatives of the density, `P = (i, j)`; `e_k` axes of the kernel whose cell it is; `⟨⟩` average
+    ///   over its support.
+    /// - Range: what lies between two supports is taken of ψ, not of averages, which cancel.
+    /// - Source: methods, (3.2), section 3.4.
+    /// - Shape: by rows of the lower triangle.
+    pub(super) fn average_along(&mut self) {
+        let (window, fields) = self.curvatures_along();
+        let range = self.widths();
+        let (places, is_fast): (Vec<(usize, usize)>, bool) =
+            (pairs(self.lattice.d).collect(), self.adaptive.is_fast);
+        let mut found: Vec<Between> = vec![Default::default(); self.cells.len()];
+        for p in 0..fields.len() {
+            for q in 0..=p {
+                let mut product = fields[p].clone();
+                product.values.iter_mut().zip(&fields[q].values).for_each(|(own, other)| *own *= other);
+                let lattice = behind_mirrors(self.lattice, places[p], places[q]);
+                let tools = (&lattice, self.integral, self.width);
+                let product = Smoothed::new(tools, (is_fast, &window), product, range);
+                let mut portions: Vec<(&[Cell], &mut [Between])> =
+                    self.cells.chunks(PORTION).zip(found.chunks_mut(PORTION)).collect();
+                parallel::for_each(&mut portions, &|_, (cells, found)| {
+                    let mut taps = Default::default();
+                    for (cell, (sums, part)) in cells.iter().zip(found.iter_mut()) {
+                        let averages;
+                        (averages, *part) = product.between(tools, cell, &mut taps);
+                        let shares = shares(&cell.axes, (places[p], places[q]), p == q, &places);
+                        for (sums, average) in sums.iter_mut().zip(averages) {
+                            sums.iter_mut().zip(shares).for_each(|(sum, share)| *sum += share * average);
+                        }
+                    }
+                });
+            }
+        }
+        for (cell, ([narrow, wide], part)) in self.cells.iter_mut().zip(found) {
+            cell.psi = std::array::from_fn(|place| blended(narrow[place], wide[place], part));
+        }
+    }
+}
+
+/// The lattice as a product of second derivatives sees it: a mirror changes its sign if it has an odd number of derivatives along
+/// that axis.
+fn behind_mirrors(lattice: &Lattice, (i, j): (usize, usize), (k, l): (usize, usize)) -> Lattice {
+    let mut own = lattice.clone();
+    for axis in lattice.axes() {
+        let is_odd = [i, j, k, l].iter().filter(|other| **other == axis).count() % 2 == 1;
+        for end in own.ends[axis].iter_mut().filter(|end| is_odd && **end == End::Mirror) {
+            *end = End::Sink;
+        }
+    }
+    own
+}
+
+/// Places of second derivatives: rows of the lower triangle.
+fn pairs(d: usize) -> impl Iterator<Item = (usize, usize)> {
+    let first = AXES - d;
+    (first..AXES).flat_map(move |i| (first..=i).map(move |j| (i, j)))
+}
+
+/// A difference along an axis; beyond ends is what these make of the field.
+fn difference(lattice: &Lattice, axis: usize, taps: &[f64]) -> Band {
+    let (n, ends) = (lattice.cells[axis], lattice.ends[axis]);
+    let near = |cell: usize| {
+        let mut own = Taps { first: 0, values: vec![0.0; n] };
+        for (tap, at) in taps.iter().zip(cell as isize - DIFFERENCES as isize..) {
+            let (other, sign, _) = fold(n, ends, at);
+            own.values[other] += sign * tap;
+        }
+        own
+    };
+    let n_ends = if n > DIFFERENCES { 0 } else { n };
+    let of_ends = [0, 1].map(|end| (0..n_ends).map(|k| near(if end == 0 { k } else { n - 1 - k })).collect());
+    Band { taps: taps.to_vec(), reach: DIFFERENCES, ends: of_ends, n, sides: ends }
+}
+
+/// What an average of two second derivatives is to products of curvatures along the axes of a kernel.
+fn shares(
+    axes: &Basis,
+    (p, q): ((usize, usize), (usize, usize)),
+    is_same: bool,
+    places: &[(usize, usize)],
+) -> [f64; 6] {
+    let of = |k: usize, (i, j): (usize, usize)| axes[k][i] * axes[k][j] * if i == j { 1.0 } else { 2.0 };
+    let mut shares = [0.0; 6];
+    for (share, &(k, l)) in shares.iter_mut().zip(places) {
+        *share = of(k, p) * of(l, q) + if is_same { 0.0 } else { of(k, q) * of(l, p) };
+    }
+    shares
+}
