@@ -7,6 +7,7 @@ mod check;
 mod completions;
 mod data;
 mod density;
+mod density_direction;
 mod density_points;
 mod error_bars;
 mod explain;

@@ -58,6 +58,8 @@ pub struct Ellipse {
     /// Squared distance, in standard deviations, at which curvatures end, and what the Gaussian is there: no step is left.
     radius: f64,
     edge: f64,
+    /// Where it stands, from the centre of its cell.
+    offset: [f64; AXES],
     pub reach: [isize; AXES],
 }
 
@@ -96,6 +98,7 @@ impl Ellipse {
             bars: None,
             radius: CURVATURE_REACH * CURVATURE_REACH,
             edge: if is_curvature { exp_of_negative(-0.5 * CURVATURE_REACH * CURVATURE_REACH) } else { 0.0 },
+            offset: [0.0; AXES],
             reach: [0; AXES],
         };
         let mut bars = [Bar::default(); AXES];
@@ -121,14 +124,20 @@ impl Ellipse {
         ellipse
     }
 
-    /// How many cells it may have, at most.
-    pub fn n_cells(&self) -> usize {
-        self.reach.iter().map(|reach| 2 * reach.unsigned_abs() + 1).product()
+    /// The same beside the centre of its cell.
+    pub fn beside(mut self, offset: [f64; AXES]) -> Self {
+        (0..AXES).filter(|&axis| offset[axis] != 0.0).for_each(|axis| self.reach[axis] += 1);
+        Self { offset, ..self }
     }
 
-    /// Cells of a row that are within it.
+    /// The least that its standard deviation can be along any line, in cells.
+    pub fn narrowest(&self) -> f64 {
+        1.0 / (AXES - self.d..AXES).map(|i| self.precision[i][i]).sum::<f64>().sqrt()
+    }
+
+    /// What part of a row is within it.
     #[inline(always)]
-    fn within(&self, x: f64, y: f64) -> (isize, isize) {
+    fn within(&self, x: f64, y: f64) -> (f64, f64) {
         let (mut low, mut high) = (-(self.reach[2] as f64), self.reach[2] as f64);
         match &self.bars {
             Some(bars) => {
@@ -136,7 +145,7 @@ impl Ellipse {
                     let at = bar.of[0] * x + bar.of[1] * y;
                     if bar.per == 0.0 {
                         if at.abs() > bar.bound {
-                            return (1, 0);
+                            return (1.0, 0.0);
                         }
                         continue;
                     }
@@ -148,13 +157,13 @@ impl Ellipse {
                 let [of_square, of_one, of_row] = self.row(x, y);
                 let root = of_one * of_one - of_square * (of_row - self.radius);
                 if root < 0.0 {
-                    return (1, 0);
+                    return (1.0, 0.0);
                 }
                 let (middle, half) = (-of_one / of_square, root.sqrt() / of_square);
                 (low, high) = (low.max(middle - half), high.min(middle + half));
             }
         }
-        (low.ceil() as isize, high.floor() as isize)
+        (low, high)
     }
 
     /// The squared distance along a row: of k², of 2k, and of none.
@@ -164,7 +173,7 @@ impl Ellipse {
         [of[2][2], of[0][2] * x + of[1][2] * y, of[0][0] * x * x + 2.0 * of[0][1] * x * y + of[1][1] * y * y]
     }
 
-    /// `e^{−½ zᵀC⁻¹z} − e` at the centres of cells, over their sum. It is even: half of it is worked out.
+    /// `e^{−½ zᵀC⁻¹z} − e` at the centres of cells, over their sum. At the centre of its cell it is even: half of it is worked out.
     #[inline(always)]
     pub fn fill(&self, stencil: &mut Stencil) {
         stencil.rows.clear();
@@ -172,17 +181,21 @@ impl Ellipse {
         stencil.reach = self.reach;
         let [of_x, of_y, _] = self.reach;
         let mut sums = [0.0; LANES];
-        for x in -of_x..0 {
+        let is_even = self.offset == [0.0; AXES];
+        for x in -of_x..if is_even { 0 } else { of_x + 1 } {
             for y in -of_y..=of_y {
                 self.fill_row((x, y), stencil, &mut sums);
             }
         }
-        for y in -of_y..0 {
-            self.fill_row((0, y), stencil, &mut sums);
+        let mut n_half = 0;
+        if is_even {
+            for y in -of_y..0 {
+                self.fill_row((0, y), stencil, &mut sums);
+            }
+            n_half = stencil.rows.len();
+            sums = sums.map(|sum| 2.0 * sum);
+            self.fill_row((0, 0), stencil, &mut sums);
         }
-        let n_half = stencil.rows.len();
-        sums = sums.map(|sum| 2.0 * sum);
-        self.fill_row((0, 0), stencil, &mut sums);
         let per = 1.0 / ((sums[0] + sums[2]) + (sums[1] + sums[3]));
         stencil.values.iter_mut().for_each(|value| *value *= per);
         let half = stencil.values.len();
@@ -200,7 +213,10 @@ impl Ellipse {
 
     #[inline(always)]
     fn fill_row(&self, (x, y): (isize, isize), stencil: &mut Stencil, sums: &mut [f64; LANES]) {
-        let (low, high) = self.within(x as f64, y as f64);
+        let [of_x, of_y, of_z] = self.offset;
+        let (from_x, from_y) = (x as f64 - of_x, y as f64 - of_y);
+        let (low, high) = self.within(from_x, from_y);
+        let (low, high) = ((low + of_z).ceil() as isize, (high + of_z).floor() as isize);
         if low > high {
             return;
         }
@@ -208,8 +224,9 @@ impl Ellipse {
         stencil.rows.push(Row { x, y, first: low, n, start });
         stencil.values.resize(start + n.next_multiple_of(LANES), 0.0);
         let (pieces, _) = stencil.values[start..].as_chunks_mut::<LANES>();
-        let [of_square, of_one, of_row] = self.row(x as f64, y as f64);
-        let (mut z, last, edge) = (LANE.map(|lane| low as f64 + lane), high as f64, self.edge);
+        let [of_square, of_one, of_row] = self.row(from_x, from_y);
+        let (mut z, last, edge) =
+            (LANE.map(|lane| low as f64 - of_z + lane), high as f64 - of_z + 0.5, self.edge);
         let mut own_sums = *sums;
         for piece in pieces {
             for lane in 0..LANES {

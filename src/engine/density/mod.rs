@@ -15,6 +15,7 @@ mod global;
 mod kinds;
 mod ladder;
 pub mod lattice;
+mod levels;
 mod limits;
 mod local;
 mod oriented;

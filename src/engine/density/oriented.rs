@@ -10,10 +10,11 @@ use super::ellipse::Ellipse;
 use super::kinds::Cell;
 use super::ladder::blended;
 use super::lattice::{AXES, End, Field, Lattice, Window};
+use super::levels::{coarse, refine};
 use super::local::{Basis, bound};
 use super::patch::{fold, scatter};
 use super::smoothed::Smoothed;
-use super::taps::Taps;
+use super::taps::{CURVATURE_REACH, REACH, Taps};
 use crate::maths::vector::{exp, ln, pow};
 
 /// Cells that differences take to each side; those of order six, first and second.
@@ -23,6 +24,9 @@ const SECOND: [f64; 7] = [1.0 / 90.0, -0.15, 1.5, -49.0 / 18.0, 1.5, -0.15, 1.0 
 
 /// Cells of which a bandwidth of curvatures has at least so many.
 const LEAST: f64 = 0.8;
+
+/// Cells of its level that a kernel for curvatures has within its standard deviation, at least.
+const RESOLVED: f64 = 2.0;
 
 /// Averages of products with the narrower and the wider of two supports, by rows of the lower triangle, and where between them.
 type Between = ([[f64; 6]; 2], f64);
@@ -94,23 +98,18 @@ impl Search<'_> {
         Ellipse::new(self.lattice.d, (&cell.axes, widths, self.lattice.edge), false)
     }
 
-    fn curvature(&self, cell: &Cell) -> Ellipse {
-        Ellipse::new(self.lattice.d, (&cell.axes, cell.g, self.lattice.edge), true)
+    /// The kernel for curvatures on a lattice of perhaps coarser cells.
+    fn curvature(&self, cell: &Cell, lattice: &Lattice) -> Ellipse {
+        Ellipse::new(lattice.d, (&cell.axes, cell.g, lattice.edge), true)
     }
 
-    /// Cells that kernels reach along each axis of the lattice, and how many one has at most.
-    fn most(&self, of: impl Fn(&Cell) -> Ellipse) -> ([usize; AXES], usize) {
-        let mut most = ([0; AXES], 0);
-        for ellipse in self.cells.iter().map(of) {
-            let reach = ellipse.reach.map(isize::unsigned_abs);
-            (0..AXES).for_each(|axis| most.0[axis] = most.0[axis].max(reach[axis]));
-            most.1 = most.1.max(ellipse.n_cells());
+    /// Cells that kernels reach along each axis of the lattice.
+    pub(super) fn reach_along(&self) -> [usize; AXES] {
+        let mut most = [0; AXES];
+        for ellipse in self.cells.iter().map(|cell| self.kernel(cell)) {
+            (0..AXES).for_each(|axis| most[axis] = most[axis].max(ellipse.reach[axis].unsigned_abs()));
         }
         most
-    }
-
-    pub(super) fn reach_along(&self) -> [usize; AXES] {
-        self.most(|cell| self.kernel(cell)).0
     }
 
     /// `ρ = Σ_b c_b W_b/V_c` on a window, or `Σ_b c_b W_b²/V_c²`.
@@ -118,13 +117,31 @@ impl Search<'_> {
         let volume = self.lattice.volume();
         let volume = if is_squared { volume * volume } else { volume };
         let mut field = Field::zeros(window, [1; AXES]);
-        let (_, most) = self.most(|cell| self.kernel(cell));
-        scatter((self.cells.len(), most), &mut field, self.width, &|idx, patch| {
+        let most = self.cells.iter().map(|cell| size(self.lattice, REACH * cell.h)).fold(0.0, f64::max);
+        scatter((self.cells.len(), most as usize), &mut field, self.width, &|idx, patch| {
             let cell = &self.cells[idx];
             let place = (cell.at, &self.kernel(cell));
             patch.fill(self.lattice, place, (counts[idx] / volume, is_squared), self.width);
         });
         field
+    }
+
+    /// Adds kernels for curvatures to a field of a level.
+    fn scatter_on(&self, level: u32, sources: &[usize], field: &mut Field) {
+        let (own, factors) = coarse(self.lattice, level);
+        let ellipse = |cell: &Cell| {
+            let place = |axis: usize| (cell.at[axis] as f64 + 0.5) / factors[axis] as f64;
+            let offset = |axis: usize| place(axis) - (cell.at[axis] / factors[axis]) as f64 - 0.5;
+            self.curvature(cell, &own).beside(std::array::from_fn(offset))
+        };
+        let product = |cell: &Cell| own.axes().map(|axis| cell.g[axis]).product::<f64>();
+        let widest = sources.iter().map(|&idx| product(&self.cells[idx])).fold(0.0, f64::max);
+        let most = size(&own, CURVATURE_REACH * pow(widest, 1.0 / self.d));
+        scatter((sources.len(), most as usize), field, self.width, &|at, patch| {
+            let (cell, count) = (&self.cells[sources[at]], self.counts[sources[at]]);
+            let place = std::array::from_fn(|axis| cell.at[axis] / factors[axis]);
+            patch.fill(&own, (place, &ellipse(cell)), (count / own.volume(), false), self.width);
+        });
     }
 
     /// All second derivatives of a density with wider kernels, by rows of the lower triangle.
@@ -133,19 +150,32 @@ impl Search<'_> {
     /// - Symbols: `W_b` with the bandwidths of curvatures, `D` differences of seven cells.
     /// - Range: bandwidths of at least 0.8 cells, of which differences see derivatives to some per cent.
     /// - Source: derivatives of a sum of kernels are the sum of theirs; sums over all cells are 0 and sums of squares those of
-    ///   integrals, as (A.3) and (A.4) of the methods want them.
+    ///   integrals, as (A.3) and (A.4) of the methods want them. Wide kernels are put on coarse cells, between which the field
+    ///   is a polynomial, if short cuts are taken.
     /// - Shape: one field each.
     fn curvatures_along(&self) -> (Window, Vec<Field>) {
-        let (lattice, volume) = (self.lattice, self.lattice.volume());
-        let (reach, most) = self.most(|cell| self.curvature(cell));
-        let cells = self.cells.iter().map(|cell| cell.at);
-        let window = Window::around(lattice, cells, reach.map(|reach| reach + DIFFERENCES));
-        let mut field = Field::zeros(&window, [1; AXES]);
-        scatter((self.cells.len(), most), &mut field, self.width, &|idx, patch| {
-            let cell = &self.cells[idx];
-            let place = (cell.at, &self.curvature(cell));
-            patch.fill(lattice, place, (self.counts[idx] / volume, false), self.width);
-        });
+        let lattice = self.lattice;
+        let (mut levels, mut reach) = (vec![0; self.cells.len()], [0; AXES]);
+        for (level, cell) in levels.iter_mut().zip(&self.cells) {
+            let ellipse = self.curvature(cell, lattice);
+            (0..AXES).for_each(|axis| reach[axis] = reach[axis].max(ellipse.reach[axis].unsigned_abs()));
+            while self.adaptive.is_fast && f64::from(2 << *level) * RESOLVED <= ellipse.narrowest() {
+                *level += 1;
+            }
+        }
+        let highest = levels.iter().copied().max().unwrap_or(0);
+        let more = reach.map(|reach| reach + DIFFERENCES);
+        let window = Window::around(lattice, self.cells.iter().map(|cell| cell.at), more);
+        let mut field = Field::zeros(&window, coarse(lattice, highest).1);
+        for level in (0..=highest).rev() {
+            let sources: Vec<usize> = (0..levels.len()).filter(|&idx| levels[idx] == level).collect();
+            self.scatter_on(level, &sources, &mut field);
+            if level > 0 {
+                let mut below = Field::zeros(&window, coarse(lattice, level - 1).1);
+                refine(lattice, &window, (field, level), &mut below);
+                field = below;
+            }
+        }
         let of = |(i, j): (usize, usize)| {
             let mut own = field.clone();
             if i == j {
@@ -214,6 +244,11 @@ fn behind_mirrors(lattice: &Lattice, (i, j): (usize, usize), (k, l): (usize, usi
         }
     }
     own
+}
+
+/// About how many cells a kernel has that reaches so far, on the mean.
+fn size(lattice: &Lattice, reach: f64) -> f64 {
+    lattice.axes().map(|axis| 2.0 * reach / lattice.edge[axis] + 4.0).product()
 }
 
 /// Places of second derivatives: rows of the lower triangle.

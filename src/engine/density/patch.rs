@@ -178,7 +178,7 @@ impl pulp::NullaryFnOnce for Filling<'_> {
     }
 }
 
-/// Adds what sources have to a field. `of` fills in what source `idx` has; no source has more values than `most`.
+/// Adds what sources have to a field. `of` fills in what source `idx` has; a source has about so many values, at most.
 pub fn scatter(
     (n, most): (usize, usize),
     field: &mut Field,
