@@ -8,8 +8,9 @@ use super::classes::{Fill, Table, bandwidth_of, class_of};
 use super::curvature::{Curvatures, curvatures};
 use super::frame::Frame;
 use super::global::histogram;
+use super::held::{Held, turned_over};
 use super::kinds::{Adaptive, Cell, Estimate, Start};
-use super::lattice::{AXES, Field, Lattice, Window};
+use super::lattice::{AXES, End, Field, Lattice, Window};
 use super::limits::{GROWTH, Limits};
 use super::local::Basis;
 use super::smoothed::Smoothed;
@@ -22,6 +23,9 @@ use std::f64::consts::PI;
 
 /// Cells that a thread takes at once.
 pub(super) const PORTION: usize = 64;
+
+/// Of the largest density, what one is at least where particles are.
+const LEAST: f64 = 1e-9;
 
 /// From this loop on the running mean of the error may end the iteration.
 const RUNNING: usize = 8;
@@ -38,6 +42,9 @@ pub(super) struct Search<'a> {
     pub(super) cells: Vec<Cell>,
     /// The density with their kernels.
     pub(super) rho: (Window, Field),
+    /// Walls that hold a value, and counts per mass, as values are of mass.
+    pub(super) held: Option<Held>,
+    pub(super) per_mass: f64,
     pub(super) d: f64,
     pub(super) constants: Constants,
 }
@@ -104,6 +111,8 @@ fn solve(
         counts,
         cells: Vec::new(),
         rho: Default::default(),
+        held: None,
+        per_mass: 1.0,
         d: lattice.d as f64,
         constants: Constants::new(lattice.d as f64),
     };
@@ -148,6 +157,8 @@ impl Search<'_> {
             cell
         };
         self.cells = tally.cells.iter().map(cell).collect();
+        let places: Vec<[usize; AXES]> = self.cells.iter().map(|cell| cell.at).collect();
+        (self.held, self.per_mass) = (Held::new(lattice, &places), n / tally.mass());
         if let Some(bases) = bases {
             self.turn(bases);
         }
@@ -202,9 +213,9 @@ impl Search<'_> {
         let range = (self.limits.support[0].max(0.5 * least), GROWTH * most);
         let rho = Smoothed::new(tools, (self.adaptive.is_fast, &window), rho, range);
         self.for_all(&|search, cell, taps| {
-            let n = rho.at(tools, cell, taps);
+            let n = rho.at(tools, cell, taps) + search.beyond(cell);
             search.widen(cell, n);
-            cell.n = rho.at(tools, cell, taps);
+            cell.n = rho.at(tools, cell, taps) + search.beyond(cell);
             search.choose_curvature(cell);
         });
         drop(rho);
@@ -221,8 +232,11 @@ impl Search<'_> {
     /// Locally averaged products of curvatures along axes.
     fn average(&mut self, tools: (&Lattice, Integral, Width)) {
         let settings = (self.adaptive.variant, self.adaptive.is_fast);
-        let Curvatures { window, fields } = curvatures(tools, settings, &self.cells, &self.counts);
+        let held = self.held.as_ref().map(|held| (held, self.per_mass));
+        let Curvatures { window, fields } = curvatures(tools, settings, (&self.cells, &self.counts), held);
         let range = self.widths();
+        let lattice = behind_walls(self.lattice);
+        let tools = (&lattice, self.integral, self.width);
         let mut place = 0;
         for i in 0..fields.len() {
             for j in 0..=i {
@@ -273,19 +287,27 @@ impl Search<'_> {
 
     /// The density with the kernels as they are.
     fn spread(&mut self) {
-        let window = Window::around(self.lattice, self.cells.iter().map(|cell| cell.at), self.reach());
-        let field = self.density_of(&self.counts, &window, false);
+        let mut window = Window::around(self.lattice, self.cells.iter().map(|cell| cell.at), self.reach());
+        if self.held.is_some() {
+            window = Window { first: [0; AXES], end: self.lattice.cells };
+        }
+        let field = self.density_of((&self.counts, self.per_mass), &window, false);
+        let most = field.values.iter().fold(0.0, |most: f64, value| most.max(*value));
         for cell in &mut self.cells {
             let [x, y, z] = cell.at;
             cell.rho = field.values[field.row(x, y) + z - field.first[2]];
+            // Kernels that are turned may have more behind an end that changes signs than before it.
+            if self.is_oriented {
+                cell.rho = cell.rho.max(LEAST * most);
+            }
         }
         self.rho = (window, field);
     }
 
     /// `ρ = Σ_b c_b W_b/V_c` on a window, or `Σ_b c_b W_b²/V_c²`.
-    fn density_of(&self, counts: &[f64], window: &Window, is_squared: bool) -> Field {
+    fn density_of(&self, (counts, per_mass): (&[f64], f64), window: &Window, is_squared: bool) -> Field {
         if self.is_oriented {
-            return self.density_along(counts, window, is_squared);
+            return self.density_along((counts, per_mass), window, is_squared);
         }
         let lattice = self.lattice;
         let mut fields = [Field::zeros(window, [1; AXES])];
@@ -313,8 +335,53 @@ impl Search<'_> {
                 }
             }
         });
+        // What walls hold does not scatter.
+        if let Some(held) = self.held.as_ref().filter(|_| !is_squared) {
+            self.add_held((held, per_mass), fill, &mut fields[0]);
+        }
         let [field] = fields;
         field
+    }
+
+    /// Adds what walls hold.
+    ///
+    /// - Equation: `2 ρ_w I/N`, `I` kernels of all cells that the wall has turned over, `N` those and the others.
+    /// - Symbols: `ρ_w` density of the wall.
+    /// - Range: N differs from one only where bandwidths differ from cell to cell.
+    /// - Source: methods, section 4.7; at the wall I is half of N, and what is smoothed is zero: there is ρ_w.
+    /// - Shape: falls from the wall on.
+    fn add_held(&self, (held, per_mass): (&Held, f64), fill: Fill, field: &mut Field) {
+        let (lattice, reach) = (self.lattice, self.reach());
+        let mirrored = mirrored(lattice);
+        let window = Window { first: [0; AXES], end: lattice.cells };
+        for &wall in &held.walls {
+            let spread = |lattice: &Lattice, depth: usize, is_behind: bool| {
+                let sources = held.before(lattice, wall, depth);
+                let mut fields = [Field::zeros(&window, [1; AXES])];
+                scatter((sources.len(), self.width), &mut fields, &|idx, spread| {
+                    let ((at, owner), line) = (sources[idx], |axis| Line::of(lattice, axis, 1));
+                    let cell = &self.cells[owner];
+                    spread.weight = 1.0;
+                    spread.taps[0][..AXES - lattice.d].iter_mut().for_each(|lent| lent.own.be_one());
+                    for axis in lattice.axes() {
+                        let own = cell.h * cell.s[axis] / lattice.edge[axis];
+                        let side = (is_behind && axis == wall.axis).then_some(wall.side);
+                        turned_over(line(axis), own, (at[axis], side), fill, &mut spread.taps[0][axis].own);
+                    }
+                });
+                let [field] = fields;
+                field
+            };
+            let reach = reach[wall.axis];
+            let (behind, all) = (spread(lattice, reach, true), spread(&mirrored, 2 * reach, false));
+            add_ratio(field, (&behind, &all), 2.0 * wall.value * per_mass);
+        }
+    }
+
+    /// What the support of a cell has of walls that hold a value.
+    fn beyond(&self, cell: &Cell) -> f64 {
+        let of = |held: &Held| held.beyond(self.lattice, self.integral, cell.at, cell.sigma);
+        self.held.as_ref().map_or(0.0, |held| self.per_mass * of(held))
     }
 
     /// Kernels of all classes along an axis, if bandwidths are rounded.
@@ -334,22 +401,49 @@ impl Search<'_> {
 
     fn finish(self, tally: &Tally, unit: f64, (history, is_settled): (Vec<f64>, bool)) -> Estimate {
         let all = Window { first: [0; AXES], end: self.lattice.cells };
-        let (counts, unit) = match self.adaptive.weighing {
-            Weighing::OfAll | Weighing::Mean => (&self.counts, unit),
-            Weighing::Number | Weighing::OfCell => (&tally.masses, 1.0),
+        let (counts, unit, per_mass) = match self.adaptive.weighing {
+            Weighing::OfAll | Weighing::Mean => (&self.counts, unit, self.per_mass),
+            Weighing::Number | Weighing::OfCell => (&tally.masses, 1.0, 1.0),
         };
         let n = self.lattice.n_cells();
         let (mut density, mut standard_error) = (vec![0.0; n], vec![0.0; n]);
         if !self.cells.is_empty() {
-            density = self.density_of(counts, &all, false).values;
+            density = self.density_of((counts, per_mass), &all, false).values;
             density.truncate(n);
             density.iter_mut().for_each(|value| *value *= unit);
-            standard_error = self.density_of(&tally.squares, &all, true).values;
+            if self.held.is_some() {
+                density.iter_mut().for_each(|value| *value = value.max(0.0));
+            }
+            standard_error = self.density_of((&tally.squares, 0.0), &all, true).values;
             standard_error.truncate(n);
             standard_error.iter_mut().for_each(|value| *value = tally.largest * value.sqrt());
         }
         Estimate { density, standard_error, cells: self.cells, history, is_settled }
     }
+}
+
+/// Adds a ratio where there is one, so many times.
+pub(super) fn add_ratio(field: &mut Field, (own, all): (&Field, &Field), factor: f64) {
+    for ((sum, own), all) in field.values.iter_mut().zip(&own.values).zip(&all.values) {
+        if *own > 0.0 {
+            *sum += factor * own / all;
+        }
+    }
+}
+
+/// A lattice whose ends keep signs.
+pub(super) fn mirrored(lattice: &Lattice) -> Lattice {
+    let mut own = lattice.clone();
+    own.ends.as_flattened_mut().iter_mut().filter(|end| end.is_odd()).for_each(|end| *end = End::Mirror);
+    own
+}
+
+/// The lattice as products of curvatures see it: behind a wall that holds a value they are what they are before it.
+pub(super) fn behind_walls(lattice: &Lattice) -> Lattice {
+    let mut own = lattice.clone();
+    let held = own.ends.as_flattened_mut().iter_mut().filter(|end| matches!(end, End::Held(_)));
+    held.for_each(|end| *end = End::Mirror);
+    own
 }
 
 /// What ends the iteration.

@@ -130,6 +130,19 @@ impl Ellipse {
         Self { offset, ..self }
     }
 
+    /// The same behind a mirror across an axis.
+    pub fn turned_over(mut self, axis: usize) -> Self {
+        for other in (0..AXES).filter(|&other| other != axis) {
+            self.precision[axis][other] = -self.precision[axis][other];
+            self.precision[other][axis] = -self.precision[other][axis];
+        }
+        for bar in self.bars.iter_mut().flatten() {
+            bar.of[axis] = -bar.of[axis];
+            bar.per = if axis == 2 { -bar.per } else { bar.per };
+        }
+        self
+    }
+
     /// The least that its standard deviation can be along any line, in cells.
     pub fn narrowest(&self) -> f64 {
         1.0 / (AXES - self.d..AXES).map(|i| self.precision[i][i]).sum::<f64>().sqrt()

@@ -34,6 +34,14 @@ impl<'a> Frame<'a> {
             let axes: Vec<(usize, f64, [End; 2])> = frame.kept.iter().zip(&frame.scales).map(axis).collect();
             frame.reduced =
                 Lattice::new(&axes).map(|lattice| (lattice, tally.along(&frame.kept, &frame.scales)));
+            let per = frame.per_volume();
+            if let Some((lattice, _)) = &mut frame.reduced {
+                for end in lattice.ends.as_flattened_mut() {
+                    if let End::Held(value) = end {
+                        *value /= per;
+                    }
+                }
+            }
         }
         frame
     }

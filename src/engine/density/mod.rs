@@ -12,6 +12,7 @@ mod direct;
 mod ellipse;
 mod frame;
 mod global;
+mod held;
 mod kinds;
 mod ladder;
 pub mod lattice;

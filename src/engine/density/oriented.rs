@@ -4,15 +4,16 @@
 //! It deliberately follows the same formulas: those of a cell are on the axes of its kernel.
 
 use super::super::parallel;
-use super::adaptive::{PORTION, Search};
+use super::adaptive::{PORTION, Search, add_ratio, behind_walls, mirrored};
 use super::bands::{Band, smooth};
 use super::ellipse::Ellipse;
+use super::held::{Held, Wall};
 use super::kinds::Cell;
 use super::ladder::blended;
 use super::lattice::{AXES, End, Field, Lattice, Window};
 use super::levels::{coarse, refine};
 use super::local::{Basis, bound};
-use super::patch::{fold, scatter};
+use super::patch::{fold, inside, scatter};
 use super::smoothed::Smoothed;
 use super::taps::{CURVATURE_REACH, REACH, Taps};
 use crate::maths::vector::{exp, ln, pow};
@@ -30,6 +31,9 @@ const RESOLVED: f64 = 2.0;
 
 /// Averages of products with the narrower and the wider of two supports, by rows of the lower triangle, and where between them.
 type Between = ([[f64; 6]; 2], f64);
+
+/// The kernel of a cell, of one kind.
+type Kind<'k> = &'k (dyn Fn(&Cell) -> Ellipse + Sync);
 
 impl Search<'_> {
     /// Axes of all kernels, and bandwidths for a start: as many cells along each.
@@ -113,17 +117,79 @@ impl Search<'_> {
     }
 
     /// `ρ = Σ_b c_b W_b/V_c` on a window, or `Σ_b c_b W_b²/V_c²`.
-    pub(super) fn density_along(&self, counts: &[f64], window: &Window, is_squared: bool) -> Field {
+    pub(super) fn density_along(
+        &self,
+        (counts, per_mass): (&[f64], f64),
+        window: &Window,
+        is_squared: bool,
+    ) -> Field {
         let volume = self.lattice.volume();
         let volume = if is_squared { volume * volume } else { volume };
         let mut field = Field::zeros(window, [1; AXES]);
         let most = self.cells.iter().map(|cell| size(self.lattice, REACH * cell.h)).fold(0.0, f64::max);
         scatter((self.cells.len(), most as usize), &mut field, self.width, &|idx, patch| {
             let cell = &self.cells[idx];
-            let place = (cell.at, &self.kernel(cell));
-            patch.fill(self.lattice, place, (counts[idx] / volume, is_squared), self.width);
+            let place = (inside(cell.at), &self.kernel(cell));
+            patch.fill(self.lattice, place, counts[idx] / volume, (is_squared, false), self.width);
         });
+        // What walls hold does not scatter.
+        if let Some(held) = self.held.as_ref().filter(|_| !is_squared) {
+            let kernel: Kind = &|cell| self.kernel(cell);
+            self.add_held_along((held, per_mass), (kernel, self.reach_along(), most), &mut field);
+        }
         field
+    }
+
+    /// Adds what walls hold, as kernels along axes do.
+    fn add_held_along(
+        &self,
+        (held, per_mass): (&Held, f64),
+        (kernel, reach, most): (Kind, [usize; AXES], f64),
+        field: &mut Field,
+    ) {
+        let lattice = self.lattice;
+        let mirrored = mirrored(lattice);
+        let window = Window { first: [0; AXES], end: lattice.cells };
+        for &wall in &held.walls {
+            let Wall { axis, side, .. } = wall;
+            let spread = |lattice: &Lattice, depth: usize, is_behind: bool| {
+                let sources = held.before(lattice, wall, depth);
+                let mut field = Field::zeros(&window, [1; AXES]);
+                scatter((sources.len(), most as usize), &mut field, self.width, &|idx, patch| {
+                    let (at, owner) = sources[idx];
+                    let (mut at, mut ellipse) = (inside(at), kernel(&self.cells[owner]));
+                    if is_behind {
+                        at[axis] =
+                            if side == 0 { 0 } else { 2 * lattice.cells[axis] as isize } - 1 - at[axis];
+                        ellipse = ellipse.turned_over(axis);
+                    }
+                    patch.fill(lattice, (at, &ellipse), 1.0, (false, is_behind), self.width);
+                });
+                field
+            };
+            let (behind, all) =
+                (spread(lattice, reach[axis], true), spread(&mirrored, 2 * reach[axis], false));
+            add_ratio(field, (&behind, &all), 2.0 * wall.value * per_mass);
+        }
+    }
+
+    /// A difference of a field along an axis; behind a wall is twice what it holds, less what is before it.
+    fn differ(&self, field: &mut Field, axis: usize, taps: &[f64; 7]) {
+        smooth(field, axis, &difference(self.lattice, axis, taps), self.width);
+        let n = self.lattice.cells[axis];
+        for wall in self.held.iter().flat_map(|held| &held.walls).filter(|wall| wall.axis == axis) {
+            for depth in 0..DIFFERENCES.min(n) {
+                let (cell, behind) = match wall.side {
+                    0 => (depth, &taps[..DIFFERENCES - depth]),
+                    _ => (n - 1 - depth, &taps[DIFFERENCES + 1 + depth..]),
+                };
+                let more = 2.0 * wall.value * self.per_mass * behind.iter().sum::<f64>();
+                let inner: usize = field.cells[axis + 1..].iter().product();
+                let n_rows: usize = field.cells[..axis].iter().product();
+                let rows = field.values.chunks_mut(inner).skip(cell).step_by(n);
+                rows.take(n_rows).flatten().for_each(|value| *value += more);
+            }
+        }
     }
 
     /// Adds kernels for curvatures to a field of a level.
@@ -139,8 +205,8 @@ impl Search<'_> {
         let most = size(&own, CURVATURE_REACH * pow(widest, 1.0 / self.d));
         scatter((sources.len(), most as usize), field, self.width, &|at, patch| {
             let (cell, count) = (&self.cells[sources[at]], self.counts[sources[at]]);
-            let place = std::array::from_fn(|axis| cell.at[axis] / factors[axis]);
-            patch.fill(&own, (place, &ellipse(cell)), (count / own.volume(), false), self.width);
+            let place = inside(std::array::from_fn(|axis| cell.at[axis] / factors[axis]));
+            patch.fill(&own, (place, &ellipse(cell)), count / own.volume(), (false, false), self.width);
         });
     }
 
@@ -159,13 +225,18 @@ impl Search<'_> {
         for (level, cell) in levels.iter_mut().zip(&self.cells) {
             let ellipse = self.curvature(cell, lattice);
             (0..AXES).for_each(|axis| reach[axis] = reach[axis].max(ellipse.reach[axis].unsigned_abs()));
-            while self.adaptive.is_fast && f64::from(2 << *level) * RESOLVED <= ellipse.narrowest() {
+            // What walls hold is put on the finest.
+            let is_coarse = self.adaptive.is_fast && self.held.is_none();
+            while is_coarse && f64::from(2 << *level) * RESOLVED <= ellipse.narrowest() {
                 *level += 1;
             }
         }
         let highest = levels.iter().copied().max().unwrap_or(0);
         let more = reach.map(|reach| reach + DIFFERENCES);
-        let window = Window::around(lattice, self.cells.iter().map(|cell| cell.at), more);
+        let mut window = Window::around(lattice, self.cells.iter().map(|cell| cell.at), more);
+        if self.held.is_some() {
+            window = Window { first: [0; AXES], end: lattice.cells };
+        }
         let mut field = Field::zeros(&window, coarse(lattice, highest).1);
         for level in (0..=highest).rev() {
             let sources: Vec<usize> = (0..levels.len()).filter(|&idx| levels[idx] == level).collect();
@@ -176,12 +247,18 @@ impl Search<'_> {
                 field = below;
             }
         }
+        if let Some(held) = &self.held {
+            let most = self.cells.iter().map(|cell| size(lattice, CURVATURE_REACH * cell.g[AXES - 1]));
+            let kernel: Kind = &|cell| self.curvature(cell, lattice);
+            self.add_held_along((held, self.per_mass), (kernel, reach, most.fold(0.0, f64::max)), &mut field);
+        }
         let of = |(i, j): (usize, usize)| {
             let mut own = field.clone();
             if i == j {
-                smooth(&mut own, i, &difference(lattice, i, &SECOND), self.width);
+                self.differ(&mut own, i, &SECOND);
             } else {
-                smooth(&mut own, i, &difference(lattice, i, &FIRST), self.width);
+                self.differ(&mut own, i, &FIRST);
+                // A wall holds the same all along it.
                 smooth(&mut own, j, &difference(lattice, j, &FIRST), self.width);
             }
             let per = 1.0 / (lattice.edge[i] * lattice.edge[j]);
@@ -236,7 +313,7 @@ impl Search<'_> {
 /// The lattice as a product of second derivatives sees it: a mirror changes its sign if it has an odd number of derivatives along
 /// that axis.
 fn behind_mirrors(lattice: &Lattice, (i, j): (usize, usize), (k, l): (usize, usize)) -> Lattice {
-    let mut own = lattice.clone();
+    let mut own = behind_walls(lattice);
     for axis in lattice.axes() {
         let is_odd = [i, j, k, l].iter().filter(|other| **other == axis).count() % 2 == 1;
         for end in own.ends[axis].iter_mut().filter(|end| is_odd && **end == End::Mirror) {

@@ -51,7 +51,7 @@ pub fn fold(n: usize, ends: [End; 2], mut cell: isize) -> (usize, f64, bool) {
         }
         cell = mirrored;
         is_mirrored = !is_mirrored;
-        if end == End::Sink {
+        if end.is_odd() {
             sign = -sign;
         }
     }
@@ -59,7 +59,7 @@ pub fn fold(n: usize, ends: [End; 2], mut cell: isize) -> (usize, f64, bool) {
 }
 
 impl Patch {
-    /// Of a source in a cell, or its square.
+    /// Of a source in a cell, perhaps beyond an end, or its square. One that is alone has no images behind ends that change signs.
     ///
     /// - Equation: `W[z] = e^{−½ zᵀC⁻¹z}/Σ_z`; cells beyond ends are those that they are mirrored to.
     /// - Symbols: z cells from the source.
@@ -69,19 +69,20 @@ impl Patch {
     pub fn fill(
         &mut self,
         lattice: &Lattice,
-        (at, ellipse): ([usize; AXES], &Ellipse),
-        (weight, is_squared): (f64, bool),
+        (at, ellipse): ([isize; AXES], &Ellipse),
+        weight: f64,
+        (is_squared, is_alone): (bool, bool),
         width: Width,
     ) {
         self.weight = weight;
         width.run(Filling { stencil: &mut self.stencil, ellipse });
         self.spans.clear();
         let is_inside = (0..AXES).all(|axis| {
-            let (at, reach) = (at[axis] as isize, self.stencil.reach[axis]);
+            let (at, reach) = (at[axis], self.stencil.reach[axis]);
             at >= reach && at + reach < lattice.cells[axis] as isize
         });
         if is_inside {
-            let place = |axis: usize, own: isize| (at[axis] as isize + own) as usize;
+            let place = |axis: usize, own: isize| (at[axis] + own) as usize;
             self.spans.extend(self.stencil.rows.iter().map(|row| Span {
                 x: place(0, row.x),
                 y: place(1, row.y),
@@ -91,7 +92,7 @@ impl Patch {
                 padded: row.n.next_multiple_of(LANES),
             }));
         } else {
-            self.fold(lattice, at);
+            self.fold(lattice, at, is_alone);
         }
         if is_squared {
             if !is_inside {
@@ -110,17 +111,21 @@ impl Patch {
     }
 
     /// Rows beyond ends are put where they appear.
-    fn fold(&mut self, lattice: &Lattice, at: [usize; AXES]) {
+    fn fold(&mut self, lattice: &Lattice, at: [isize; AXES], is_alone: bool) {
         let Self { stencil: Stencil { rows, values, .. }, spans, .. } = self;
-        let one =
-            |axis: usize, own: isize| fold(lattice.cells[axis], lattice.ends[axis], at[axis] as isize + own);
+        let one = |axis: usize, own: isize| {
+            let (n, ends, cell) = (lattice.cells[axis], lattice.ends[axis], at[axis] + own);
+            let is_beyond = (cell < 0 && ends[0].is_odd()) || (cell >= n as isize && ends[1].is_odd());
+            let (cell, sign, is_mirrored) = fold(n, ends, cell);
+            (cell, if is_alone && is_beyond { 0.0 } else { sign }, is_mirrored)
+        };
         for &Row { x, y, first, n, start } in rows.iter() {
             let ((x, of_x, _), (y, of_y, _)) = (one(0, x), one(1, y));
             let mut done = 0;
             while done < n {
                 // What ends lie between is folded differently.
                 let (length, here) = (lattice.cells[2] as isize, first + done as isize);
-                let rest = length - (at[2] as isize + here).rem_euclid(length);
+                let rest = length - (at[2] + here).rem_euclid(length);
                 let n_own = rest.min((n - done) as isize) as usize;
                 let (z, of_z, is_mirrored) = one(2, here);
                 let own = &mut values[start + done..start + done + n_own];
@@ -247,4 +252,9 @@ fn add(slab: &mut Slab, span: &Span, weight: f64, all: &[f64]) {
     for (value, own) in rest.iter_mut().zip(of_rest) {
         *value += weight * own;
     }
+}
+
+/// A cell as sources are placed by.
+pub fn inside(at: [usize; AXES]) -> [isize; AXES] {
+    at.map(|at| at as isize)
 }
