@@ -1,6 +1,7 @@
 //! `lamella density`: from points of any table to a density on cells.
 
 use super::density_direction;
+use super::density_ends::Ends;
 use super::density_points::Points;
 use super::text::{duration, significant};
 use super::{CommandResult, Exit, Stopped, Terminal};
@@ -42,9 +43,10 @@ pub(crate) struct Arguments {
     /// Take only rows that have this in a column, such as species=A or t=10; perhaps several times
     #[arg(long = "where", value_name = "COLUMN=VALUE", value_parser = super::load::parse_setting)]
     pub(super) conditions: Vec<(String, String)>,
-    /// What both ends of each axis are: one word for all, or one per axis
-    #[arg(long, value_name = "WORD,…", value_enum, value_delimiter = ',', default_value = "reflect")]
-    ends: Vec<EndName>,
+    /// What both ends of each axis are, one word for all or one per axis: reflect (nothing passes), periodic (both ends are one),
+    /// absorb (the density is zero), "hold 2 kg/m^2" (the density has this value); "reflect:absorb" if they differ
+    #[arg(long, value_name = "WORD,…", value_parser = Ends::parse, value_delimiter = ',', default_value = "reflect")]
+    ends: Vec<Ends>,
     /// What every point is spread by
     #[arg(long, value_enum, default_value_t = KernelName::Adaptive)]
     kernel: KernelName,
@@ -109,16 +111,6 @@ impl KernelName {
     fn word(self) -> String {
         self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
     }
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum EndName {
-    /// Nothing passes
-    Reflect,
-    /// Both ends are one
-    Periodic,
-    /// Nothing stays: the density is zero
-    Absorb,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -201,6 +193,8 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
     let seconds = estimated.elapsed().as_secs_f64();
     let error = norm(&found.standard_error) / norm(&found.density);
     let kept = found.density.iter().sum::<f64>() * lattice.volume() / tally.mass();
+    // Walls that hold a value give and take.
+    let kept = if arguments.ends.iter().any(Ends::holds) { 1.0 } else { kept };
     let table = tabulate(arguments, &points, (&lattice, &low), (&tally, &mut found));
     let path = write_density(&arguments.out, &table)
         .map_err(|error| Stopped::new(Exit::Failed, Diagnostic::error(codes::F103, error.to_string())))?;
@@ -235,6 +229,9 @@ fn check(arguments: &Arguments) -> Result<(), Stopped> {
     }
     if let Some((_, name)) = idle.iter().find(|(is_given, _)| *is_given && !differ) {
         return Err(wrong(&format!("{name} is for kernels that differ from place to place")));
+    }
+    if !differ && arguments.ends.iter().any(Ends::holds) {
+        return Err(wrong("--ends hold is for kernels that differ from place to place"));
     }
     let Some(first) = arguments.domain.first() else { return Ok(()) };
     let dimension = |axis: &Axis| axis.unit.as_ref().map(|(_, unit)| unit.dimension);
@@ -312,16 +309,12 @@ fn lattice(arguments: &Arguments, points: &Points) -> Result<Lattice, Stopped> {
     if arguments.ends.len() != 1 && arguments.ends.len() != d {
         return Err(wrong(&format!("--ends has {} words for {d} axes", arguments.ends.len())));
     }
-    let axis = |idx: usize| {
+    let axis = |idx: usize| -> Result<(usize, f64, [End; 2]), Stopped> {
         let (Axis { low, high, .. }, factor) = (&arguments.domain[idx], points.factors[idx]);
-        let end = match arguments.ends.get(idx).unwrap_or(&arguments.ends[0]) {
-            EndName::Reflect => End::Mirror,
-            EndName::Periodic => End::Wrap,
-            EndName::Absorb => End::Sink,
-        };
-        (arguments.cells[idx], (high - low) * factor / arguments.cells[idx] as f64, [end; 2])
+        let ends = arguments.ends.get(idx).unwrap_or(&arguments.ends[0]).of(points, d)?;
+        Ok((arguments.cells[idx], (high - low) * factor / arguments.cells[idx] as f64, ends))
     };
-    let axes: Vec<(usize, f64, [End; 2])> = (0..d).map(axis).collect();
+    let axes = (0..d).map(axis).collect::<Result<Vec<(usize, f64, [End; 2])>, Stopped>>()?;
     Lattice::new(&axes).ok_or_else(|| wrong("cells of this domain have no size that is a number"))
 }
 
@@ -381,7 +374,7 @@ fn tabulate(
         "settled": found.is_settled,
         "mean_bandwidth": found.history.last(),
         "weighing": arguments.weighing.to_possible_value().map(|value| value.get_name().to_owned()),
-        "ends": arguments.ends.iter().filter_map(|end| end.to_possible_value()).map(|end| end.get_name().to_owned()).collect::<Vec<String>>(),
+        "ends": arguments.ends.iter().map(|ends| ends.text.clone()).collect::<Vec<String>>(),
         "bandwidth_bounds": adaptive(arguments, points.factors[0]).bounds,
         "weight_inside": tally.mass(),
         "effective_points": tally.effective(),

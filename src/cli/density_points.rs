@@ -7,7 +7,7 @@ use super::files::read_data;
 use super::{Exit, Stopped};
 use lamella::data::{Column, DataFile, Kind, MAX_NUMBERS, Place, ReadError, columns, parquet};
 use lamella::diagnostic::{Diagnostic, codes};
-use lamella::units::Unit;
+use lamella::units::{Dimension, Unit};
 use std::path::Path;
 
 /// Numbers in SI where units are known, weights after coordinates, velocities last; the factors of coordinates and the units of
@@ -17,6 +17,7 @@ pub(super) struct Points {
     pub(super) names: Vec<String>,
     pub(super) factors: Vec<f64>,
     pub(super) units: Vec<String>,
+    pub(super) dimensions: Vec<Dimension>,
     pub(super) numbers: Vec<Vec<f64>>,
 }
 
@@ -78,6 +79,7 @@ impl Points {
             hash: file.hash.clone(),
             factors: units[..d].iter().map(|(_, unit)| unit.factor()).collect(),
             units: units.iter().map(|(text, unit)| si(text, unit)).collect(),
+            dimensions: units.iter().map(|(_, unit)| unit.dimension).collect(),
             names: wanted,
             numbers: selected(arguments, &file, found.numbers)?,
         })

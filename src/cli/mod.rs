@@ -8,6 +8,7 @@ mod completions;
 mod data;
 mod density;
 mod density_direction;
+mod density_ends;
 mod density_points;
 mod error_bars;
 mod explain;

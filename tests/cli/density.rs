@@ -89,7 +89,33 @@ fn what_ends_absorb_is_told() {
         folder.lamella(&arguments).exits(0)
     };
     of("absorb").gives("% of the weight is beyond ends that absorb");
+    of("reflect:absorb,reflect").gives("outside of the domain are left out");
     of("reflect").gives("settled").gives("outside of the domain are left out");
+}
+
+/// Ends hold a density, in its unit: it is found there.
+#[test]
+fn ends_hold_a_density() {
+    let folder = Folder::new();
+    // Even points on a kilometre: 1.6 per metre.
+    let points: String = (0..1600).map(|i| format!("{}\n", (f64::from(i) + 0.5) / 1600.0)).collect();
+    folder.write("points.csv", format!("x\n{points}"));
+    let of = |ends: &str| {
+        let arguments =
+            ["density", "points.csv", "--out", "d.parquet", "--domain", "0..1 km", "--cells", "400"];
+        folder.lamella(&[&arguments[..], &["--ends", ends]].concat()).exits(0);
+        columns(&folder.path("d.parquet"), &["density"]).remove(0)
+    };
+    for (ends, expected) in [
+        ("hold 1.6 1/m", [1.6, 1.6]),
+        ("hold 3.2 1/m:hold 800 1/km", [3.2, 0.8]),
+        ("hold 3.2:reflect", [3.2, 1.6]),
+    ] {
+        let found = of(ends);
+        for (own, expected) in [found[0], found[399]].into_iter().zip(expected) {
+            assert!((own / expected - 1.0).abs() < 0.05, "{ends}: {own} for {expected}");
+        }
+    }
 }
 
 /// A table of ours says its units; a scene's particles are points of a density.
@@ -161,7 +187,8 @@ fn kernels_follow_directions() {
     }
     folder.write("points.csv", text);
     let of = |more: &[&str]| {
-        let arguments = ["density", "points.csv", "--out", "d.parquet", "--domain", "0..8, 0..8", "--cells", "8,8"];
+        let arguments =
+            ["density", "points.csv", "--out", "d.parquet", "--domain", "0..8, 0..8", "--cells", "8,8"];
         folder.lamella(&[&arguments, more].concat()).exits(0);
         let kernels = ["density", "bandwidth_along", "bandwidth_across"];
         columns(&folder.path("d.parquet"), &kernels)
@@ -196,7 +223,12 @@ fn what_is_wrong_is_said_in_one_sentence() {
     folder.write("near.csv", "x,z\n1,1\n5,5\n");
     let plane = ["near.csv", "--domain", "0..9,0..9", "--cells", "4,4", "--columns", "x,z"];
     let of_plane = |more: &[&'static str]| [&plane, more].concat();
-    let directions: [(Vec<&str>, &str); 6] = [
+    let directions: [(Vec<&str>, &str); 11] = [
+        (of_plane(&["--ends", "hold"]), "`hold` is no end"),
+        (of_plane(&["--ends", "hold -1"]), "a number of zero or more"),
+        (of_plane(&["--ends", "hold 1 kg/m^2"]), "an end holds a density in kg/m^2"),
+        (of_plane(&["--ends", "reflect:periodic"]), "both are periodic, or none"),
+        (of_plane(&["--ends", "hold 1", "--kernel", "histogram"]), "--ends hold is for kernels that differ"),
         (of_plane(&["--direction", "north"]), "`north` is no angle"),
         (of_plane(&["--direction", "1,2,3"]), "--direction has 3 components for 2 axes"),
         (of_plane(&["--direction", "0,0"]), "zero length"),
@@ -205,7 +237,11 @@ fn what_is_wrong_is_said_in_one_sentence() {
         (of_plane(&["--direction", "1,0", "--velocity", "x,z"]), "cannot be used with"),
     ];
     let cases: [(&[&str], i32, &str); 17] = [
-        (&["near.csv", "--domain", "0..9", "--cells", "4", "--direction", "1"], 2, "on a line there is one direction"),
+        (
+            &["near.csv", "--domain", "0..9", "--cells", "4", "--direction", "1"],
+            2,
+            "on a line there is one direction",
+        ),
         (&["points.csv", "--domain", "0..1", "--cells", "4,4"], 2, "--cells has 2 numbers for 1 axes"),
         (&["points.csv", "--domain", "0..1,0..1", "--cells", "4,4"], 2, "line 3"),
         (&["points.csv", "--domain", "0..1", "--cells", "0"], 2, "1 to 100 million cells"),
@@ -240,7 +276,10 @@ fn what_is_wrong_is_said_in_one_sentence() {
         .exits(2)
         .says("parquet");
     for (arguments, text) in directions {
-        folder.lamella(&[&["density"], &arguments[..], &["--out", "density.parquet"]].concat()).exits(2).says(text);
+        folder
+            .lamella(&[&["density"], &arguments[..], &["--out", "density.parquet"]].concat())
+            .exits(2)
+            .says(text);
     }
     for (arguments, code, text) in &cases {
         let arguments = [&["density"], *arguments, &["--out", "density.parquet"]].concat();
