@@ -356,6 +356,35 @@ fn a_density_is_the_sum_of_the_kernels_that_are_told() {
     }
 }
 
+/// An axis of one cell is left out, and the part of a direction along it; what is told is told on the axes that there are.
+#[test]
+fn an_axis_of_one_cell_is_left_out() {
+    let mut draws = Draws(4);
+    let x: Vec<f64> = (0..2000).map(|_| 20.0 + 5.0 * draws.normal()).collect();
+    let z: Vec<f64> = x.iter().map(|x| 4.0 + 0.1 * x + 1.0 * draws.normal()).collect();
+    let half = vec![0.5; x.len()];
+    let adaptive = |orientation: Orientation| Adaptive { orientation, ..Adaptive::default() };
+    let plane = Lattice::new(&[(40, 1.0, CLOSED), (30, 0.4, CLOSED)]).unwrap();
+    let tally = Tally::of(&plane, &[0.0, 0.0], &[&x, &z], None);
+    let along = Orientation::All([0.0, 1.0, 0.1]);
+    let expected = estimate(&plane, &tally, &adaptive(along), Width::widest());
+    let space = Lattice::new(&[(40, 1.0, CLOSED), (1, 7.0, CLOSED), (30, 0.4, CLOSED)]).unwrap();
+    let tally = Tally::of(&space, &[0.0; 3], &[&x, &half, &z], None);
+    let found = estimate(&space, &tally, &adaptive(Orientation::All([1.0, 9.0, 0.1])), Width::widest());
+    for (own, expected) in found.density.iter().zip(&expected.density) {
+        assert!((7.0 * own - expected).abs() <= 1e-12 * expected, "{own} for {expected}");
+    }
+    for (own, expected) in found.cells.iter().zip(&expected.cells) {
+        assert_eq!(own.axes[1], [0.0; 3]);
+        let (own, expected) = (own.matrix(), expected.matrix());
+        let pairs = [(own[0][0], expected[1][1]), (own[0][2], expected[1][2]), (own[2][2], expected[2][2])];
+        let (most, none) = (expected[1][1], own[1]);
+        assert!(pairs.iter().all(|(own, other)| (own - other).abs() < 1e-12 * most), "{pairs:?}");
+        assert_eq!(none, [0.0; 3]);
+    }
+    assert!(expected.cells.iter().any(|cell| cell.matrix()[1][2] > 0.1));
+}
+
 /// Without a direction kernels are round: those of a cloud without any are those of round kernels, but for how curvatures are
 /// found; and cells with and without stand side by side.
 #[test]
@@ -395,6 +424,7 @@ fn bits_hang_neither_on_threads_nor_on_vectors() {
                 let adaptive =
                     Adaptive { is_fast, orientation, most_loops: 2, tolerance: 0.0, ..Adaptive::default() };
                 let found = pool.install(|| estimate(&lattice, &tally, &adaptive, width));
+                assert!(found.density.iter().all(|own| own.is_finite() && *own >= 0.0));
                 found.density.iter().chain(&found.standard_error).map(|value| value.to_bits()).collect()
             };
             let one = bits(1, Width::widest());

@@ -411,7 +411,7 @@ impl Search<'_> {
             density = self.density_of((counts, per_mass), &all, false).values;
             density.truncate(n);
             density.iter_mut().for_each(|value| *value *= unit);
-            if self.held.is_some() {
+            if self.held.is_some() || self.is_oriented {
                 density.iter_mut().for_each(|value| *value = value.max(0.0));
             }
             standard_error = self.density_of((&tally.squares, 0.0), &all, true).values;

@@ -165,9 +165,7 @@ impl Rung {
                     (0, [End::Wrap, _]) => (n_all - 1, 1.0),
                     (0, [end, _]) => (0, if end.is_odd() { -1.0 } else { 1.0 }),
                     (after, [_, End::Wrap]) if after > n_all => (0, 1.0),
-                    (after, [_, end]) if after > n_all => {
-                        (n_all - 1, if end.is_odd() { -1.0 } else { 1.0 })
-                    }
+                    (after, [_, end]) if after > n_all => (n_all - 1, if end.is_odd() { -1.0 } else { 1.0 }),
                     _ => (after - 1, 1.0),
                 };
                 // Of windows that end before the domain does nothing is beyond.
