@@ -8,7 +8,7 @@ mod draws;
 
 use draws::Draws;
 use lamella::engine::density::{
-    Adaptive, End, Lattice, Rule, Shape, Tally, Weighing, estimate, global, histogram,
+    Adaptive, End, Lattice, Orientation, Rule, Shape, Tally, Weighing, estimate, global, histogram,
 };
 use lamella::maths::scalar::sin;
 use lamella::maths::wide::Width;
@@ -53,19 +53,20 @@ fn main() {
             }
             least
         };
-        let adaptive = |most_loops: usize, tolerance: f64| {
-            let adaptive = Adaptive { most_loops, tolerance, ..Adaptive::default() };
+        let adaptive = |most_loops: usize, tolerance: f64, orientation: Orientation| {
+            let adaptive = Adaptive { most_loops, tolerance, orientation, ..Adaptive::default() };
             seconds(&|| estimate(&lattice, &tally, &adaptive, Width::widest()).history.len() - 1)
         };
-        let (fixed, _) = adaptive(loops, 0.0);
-        let (settled, settled_loops) = adaptive(20, 0.02);
+        let (fixed, _) = adaptive(loops, 0.0, Orientation::Axes);
+        let (turned, _) = adaptive(loops, 0.0, Orientation::All([0.3, 1.0, 0.3]));
+        let (settled, settled_loops) = adaptive(20, 0.02, Orientation::Axes);
         let rule = Rule::PlugIn(Shape::Stretched);
         let (plug_in, _) = seconds(&|| {
             global(&lattice, &tally, rule, Weighing::OfAll, Width::widest()).map_or(0, |found| found.n_loops)
         });
         let (bare, _) = seconds(&|| histogram(&lattice, &tally).0.len());
         println!(
-            "{}-D {n:>8} particles in {:>6} cells: {loops} loops {fixed:.3} s; settled after {settled_loops} in \
+            "{}-D {n:>8} particles in {:>6} cells: {loops} loops {fixed:.3} s, along a direction {turned:.3} s; settled after {settled_loops} in \
              {settled:.3} s; plug-in {plug_in:.3} s; histogram {bare:.4} s",
             cells.len(),
             tally.cells.len(),

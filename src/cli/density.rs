@@ -1,5 +1,7 @@
 //! `lamella density`: from points of any table to a density on cells.
 
+use super::density_direction;
+use super::density_ends::Ends;
 use super::density_points::Points;
 use super::text::{duration, significant};
 use super::{CommandResult, Exit, Stopped, Terminal};
@@ -41,12 +43,26 @@ pub(crate) struct Arguments {
     /// Take only rows that have this in a column, such as species=A or t=10; perhaps several times
     #[arg(long = "where", value_name = "COLUMN=VALUE", value_parser = super::load::parse_setting)]
     pub(super) conditions: Vec<(String, String)>,
-    /// What both ends of each axis are: one word for all, or one per axis
-    #[arg(long, value_name = "WORD,…", value_enum, value_delimiter = ',', default_value = "reflect")]
-    ends: Vec<EndName>,
+    /// What both ends of each axis are, one word for all or one per axis: reflect (nothing passes), periodic (both ends are one),
+    /// absorb (the density is zero), "hold 2 kg/m^2" (the density has this value); "reflect:absorb" if they differ
+    #[arg(long, value_name = "WORD,…", value_parser = Ends::parse, value_delimiter = ',', default_value = "reflect")]
+    ends: Vec<Ends>,
     /// What every point is spread by
     #[arg(long, value_enum, default_value_t = KernelName::Adaptive)]
     kernel: KernelName,
+    /// Direction that kernels are stretched along: in a plane an angle from the first axis, such as 30deg, or components per axis,
+    /// such as 1,0,0.2
+    #[arg(
+        long,
+        value_name = "ANGLE|X,…",
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        conflicts_with = "velocity"
+    )]
+    pub(super) direction: Vec<String>,
+    /// Columns of components, one per axis: kernels are stretched along the mean of a cell's points
+    #[arg(long, value_name = "NAME,…", value_delimiter = ',')]
+    pub(super) velocity: Vec<String>,
     /// Least and largest bandwidth of kernels that differ, in the unit of the domain
     #[arg(long, value_name = "LOW..HIGH", value_parser = Axis::parse)]
     bandwidth: Option<Axis>,
@@ -95,16 +111,6 @@ impl KernelName {
     fn word(self) -> String {
         self.to_possible_value().map_or_else(String::new, |value| value.get_name().to_owned())
     }
-}
-
-#[derive(Clone, Copy, ValueEnum)]
-enum EndName {
-    /// Nothing passes
-    Reflect,
-    /// Both ends are one
-    Periodic,
-    /// Nothing stays: the density is zero
-    Absorb,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -160,15 +166,20 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
     let lattice = lattice(arguments, &points)?;
     let low: Vec<f64> =
         arguments.domain.iter().zip(&points.factors).map(|(axis, factor)| axis.low * factor).collect();
-    let (coordinates, weights) = points.numbers.split_at(arguments.domain.len());
-    let coordinates: Vec<&[f64]> = coordinates.iter().map(|own| &own[..]).collect();
-    let tally = Tally::of(&lattice, &low, &coordinates, weights.first().map(|own| &own[..]));
+    let numbers: Vec<&[f64]> = points.numbers.iter().map(|own| &own[..]).collect();
+    let (coordinates, rest) = numbers.split_at(arguments.domain.len());
+    let (weights, velocities) = rest.split_at(usize::from(arguments.weight.is_some()));
+    let weights = weights.first().copied();
+    let tally = Tally::of(&lattice, &low, coordinates, weights);
     if tally.cells.is_empty() {
         let message = Diagnostic::error(codes::F101, "no point with a weight lies within the domain");
         let help = format!("{} points are outside: look at --domain, --columns and units", tally.outside.0);
         return Err(Stopped::new(Exit::SceneWrong, message.help(help)));
     }
-    let adaptive = adaptive(arguments, points.factors[0]);
+    let mut adaptive = adaptive(arguments, points.factors[0]);
+    adaptive.orientation = density_direction::orientation(arguments, &lattice, || {
+        tally.means(&lattice, &low, (coordinates, weights), velocities)
+    })?;
     let estimated = Instant::now();
     let work = || spread(arguments.kernel, &lattice, &tally, &adaptive);
     let mut found = match arguments.threads {
@@ -182,6 +193,8 @@ pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
     let seconds = estimated.elapsed().as_secs_f64();
     let error = norm(&found.standard_error) / norm(&found.density);
     let kept = found.density.iter().sum::<f64>() * lattice.volume() / tally.mass();
+    // Walls that hold a value give and take.
+    let kept = if arguments.ends.iter().any(Ends::holds) { 1.0 } else { kept };
     let table = tabulate(arguments, &points, (&lattice, &low), (&tally, &mut found));
     let path = write_density(&arguments.out, &table)
         .map_err(|error| Stopped::new(Exit::Failed, Diagnostic::error(codes::F103, error.to_string())))?;
@@ -209,8 +222,16 @@ fn check(arguments: &Arguments) -> Result<(), Stopped> {
         (arguments.parity, "--parity"),
         (arguments.bandwidth.is_some(), "--bandwidth"),
     ];
+    if density_direction::is_asked_for(arguments)
+        && (arguments.kernel != KernelName::Adaptive || arguments.parity)
+    {
+        return Err(wrong("--direction and --velocity are for --kernel adaptive, without --parity"));
+    }
     if let Some((_, name)) = idle.iter().find(|(is_given, _)| *is_given && !differ) {
         return Err(wrong(&format!("{name} is for kernels that differ from place to place")));
+    }
+    if !differ && arguments.ends.iter().any(Ends::holds) {
+        return Err(wrong("--ends hold is for kernels that differ from place to place"));
     }
     let Some(first) = arguments.domain.first() else { return Ok(()) };
     let dimension = |axis: &Axis| axis.unit.as_ref().map(|(_, unit)| unit.dimension);
@@ -226,7 +247,7 @@ fn check(arguments: &Arguments) -> Result<(), Stopped> {
             return Err(wrong(&format!("column `{name}` is there twice")));
         }
         let is_taken = ["density", "standard_error", "n_particles", "support"].contains(&name.as_str());
-        if is_taken || name.starts_with("bandwidth_") {
+        if is_taken || name.starts_with("bandwidth_") || name.starts_with("direction_") {
             return Err(wrong(&format!("`{name}` is a column of the result: coordinates need other names")));
         }
     }
@@ -288,16 +309,12 @@ fn lattice(arguments: &Arguments, points: &Points) -> Result<Lattice, Stopped> {
     if arguments.ends.len() != 1 && arguments.ends.len() != d {
         return Err(wrong(&format!("--ends has {} words for {d} axes", arguments.ends.len())));
     }
-    let axis = |idx: usize| {
+    let axis = |idx: usize| -> Result<(usize, f64, [End; 2]), Stopped> {
         let (Axis { low, high, .. }, factor) = (&arguments.domain[idx], points.factors[idx]);
-        let end = match arguments.ends.get(idx).unwrap_or(&arguments.ends[0]) {
-            EndName::Reflect => End::Mirror,
-            EndName::Periodic => End::Wrap,
-            EndName::Absorb => End::Sink,
-        };
-        (arguments.cells[idx], (high - low) * factor / arguments.cells[idx] as f64, [end; 2])
+        let ends = arguments.ends.get(idx).unwrap_or(&arguments.ends[0]).of(points, d)?;
+        Ok((arguments.cells[idx], (high - low) * factor / arguments.cells[idx] as f64, ends))
     };
-    let axes: Vec<(usize, f64, [End; 2])> = (0..d).map(axis).collect();
+    let axes = (0..d).map(axis).collect::<Result<Vec<(usize, f64, [End; 2])>, Stopped>>()?;
     Lattice::new(&axes).ok_or_else(|| wrong("cells of this domain have no size that is a number"))
 }
 
@@ -306,6 +323,7 @@ fn adaptive(arguments: &Arguments, factor: f64) -> Adaptive {
         variant: if arguments.parity { Variant::Released } else { Variant::Corrected },
         shape: if arguments.kernel == KernelName::Round { Shape::Round } else { Shape::Stretched },
         start: Start::NormalReference,
+        orientation: Default::default(),
         weighing: match arguments.weighing {
             WeighingName::All => Weighing::OfAll,
             WeighingName::Mean => Weighing::Mean,
@@ -338,10 +356,11 @@ fn tabulate(
     let cells = of_cells.zip(&tally.cells).zip(&tally.counts).map(|((cell, &idx), &count)| DensityCell {
         idx: idx as usize,
         n_particles: count as u64,
-        bandwidth: lattice.axes().map(|axis| cell.h * cell.s[axis]).filter(|h| *h > 0.0).collect(),
+        bandwidth: density_direction::bandwidths(arguments, lattice, cell),
+        direction: density_direction::of_cell(lattice, cell),
         support: cell.sigma,
     });
-    let notes = serde_json::json!({
+    let mut notes = serde_json::json!({
         "version": 1,
         "lamella": env!("CARGO_PKG_VERSION"),
         "file": { "name": arguments.file.file_name().map(|name| name.to_string_lossy().into_owned()), "hash": points.hash },
@@ -355,19 +374,21 @@ fn tabulate(
         "settled": found.is_settled,
         "mean_bandwidth": found.history.last(),
         "weighing": arguments.weighing.to_possible_value().map(|value| value.get_name().to_owned()),
-        "ends": arguments.ends.iter().filter_map(|end| end.to_possible_value()).map(|end| end.get_name().to_owned()).collect::<Vec<String>>(),
+        "ends": arguments.ends.iter().map(|ends| ends.text.clone()).collect::<Vec<String>>(),
         "bandwidth_bounds": adaptive(arguments, points.factors[0]).bounds,
         "weight_inside": tally.mass(),
         "effective_points": tally.effective(),
         "points_outside": tally.outside.0,
         "weight_outside": tally.outside.1,
     });
+    density_direction::note(arguments, &mut notes);
     DensityTable {
         axes: axes.collect(),
         unit: points.units.get(low.len()).cloned().unwrap_or_default(),
         density: std::mem::take(&mut found.density),
         standard_error: std::mem::take(&mut found.standard_error),
         is_sparse: arguments.nonzero,
+        is_oriented: density_direction::is_asked_for(arguments),
         cells: cells.collect(),
         notes: notes.to_string(),
     }

@@ -7,15 +7,17 @@ use super::files::read_data;
 use super::{Exit, Stopped};
 use lamella::data::{Column, DataFile, Kind, MAX_NUMBERS, Place, ReadError, columns, parquet};
 use lamella::diagnostic::{Diagnostic, codes};
-use lamella::units::Unit;
+use lamella::units::{Dimension, Unit};
 use std::path::Path;
 
-/// Numbers in SI where units are known, the weights last; the factors of coordinates and the units of all.
+/// Numbers in SI where units are known, weights after coordinates, velocities last; the factors of coordinates and the units of
+/// coordinates and weights.
 pub(super) struct Points {
     pub(super) hash: String,
     pub(super) names: Vec<String>,
     pub(super) factors: Vec<f64>,
     pub(super) units: Vec<String>,
+    pub(super) dimensions: Vec<Dimension>,
     pub(super) numbers: Vec<Vec<f64>>,
 }
 
@@ -56,14 +58,19 @@ impl Points {
             units.push(unit_of(weight, None));
             wanted.push(weight.clone());
         }
-        let declared: Vec<Column> = wanted
-            .iter()
-            .zip(&units)
-            .map(|(name, (_, unit))| Column { name: name.clone(), unit: *unit })
+        let velocities: Vec<Unit> = arguments.velocity.iter().map(|name| unit_of(name, None).1).collect();
+        if velocities.iter().any(|unit| unit.dimension != velocities[0].dimension) {
+            return Err(wrong("columns of --velocity have units of different kinds"));
+        }
+        let of_points = wanted.iter().zip(units.iter().map(|(_, unit)| unit));
+        let declared: Vec<Column> = of_points
+            .chain(arguments.velocity.iter().zip(&velocities))
+            .map(|(name, unit)| Column { name: name.clone(), unit: *unit })
             .collect();
         let found =
             columns::read(&file.bytes, &declared).map_err(|error| unreadable(&arguments.file, &error))?;
-        if let Some(row) = found.numbers.get(d).and_then(|own| own.iter().position(|weight| *weight < 0.0)) {
+        let weights = found.numbers.get(d).filter(|_| arguments.weight.is_some());
+        if let Some(row) = weights.and_then(|own| own.iter().position(|weight| *weight < 0.0)) {
             let error =
                 ReadError::new(lamella::data::Kind::Value, "a weight is below zero").at(found.places.of(row));
             return Err(unreadable(&arguments.file, &error));
@@ -72,6 +79,7 @@ impl Points {
             hash: file.hash.clone(),
             factors: units[..d].iter().map(|(_, unit)| unit.factor()).collect(),
             units: units.iter().map(|(text, unit)| si(text, unit)).collect(),
+            dimensions: units.iter().map(|(_, unit)| unit.dimension).collect(),
             names: wanted,
             numbers: selected(arguments, &file, found.numbers)?,
         })

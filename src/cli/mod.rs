@@ -7,6 +7,8 @@ mod check;
 mod completions;
 mod data;
 mod density;
+mod density_direction;
+mod density_ends;
 mod density_points;
 mod error_bars;
 mod explain;

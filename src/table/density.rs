@@ -21,8 +21,10 @@ const ROWS: usize = 122_880;
 pub struct DensityCell {
     pub idx: usize,
     pub n_particles: u64,
-    /// By axis.
+    /// By axis; zero where there is none.
     pub bandwidth: Vec<f64>,
+    /// Unit vector that the first of them is along, if there is one.
+    pub direction: Vec<f64>,
     pub support: f64,
 }
 
@@ -39,6 +41,8 @@ pub struct DensityTable {
     pub cells: Vec<DensityCell>,
     /// Whether cells without a density are left out.
     pub is_sparse: bool,
+    /// Whether bandwidths are along directions: the first along that of the cell, the others across.
+    pub is_oriented: bool,
     /// JSON: where it comes from.
     pub notes: String,
 }
@@ -70,13 +74,40 @@ impl DensityTable {
         columns.push(number("standard_error", &density, "scatter of the density by the number of particles"));
         columns.push(count("n_particles", "particles in the cell"));
         let where_any = "in cells with particles";
-        for (name, unit, ..) in &self.axes {
-            let doc = format!("bandwidth of the kernel along {name}, {where_any}");
-            columns.push(number(&format!("bandwidth_{name}"), unit, &doc).or_null());
+        for (axis, (name, unit, ..)) in self.axes.iter().enumerate() {
+            let (column, doc) = match self.local_axes().get(axis) {
+                None => (
+                    format!("bandwidth_{name}"),
+                    format!("bandwidth of the kernel along {name}, {where_any}"),
+                ),
+                Some((column, way)) => {
+                    (format!("bandwidth_{column}"), format!("bandwidth of the kernel {way}, {where_any}"))
+                }
+            };
+            columns.push(number(&column, unit, &doc).or_null());
+        }
+        for (name, ..) in self.axes.iter().filter(|_| self.is_oriented) {
+            let doc = format!(
+                "component along {name} of the direction of the kernel, a unit vector, {where_any} that have one"
+            );
+            columns.push(number(&format!("direction_{name}"), "", &doc).or_null());
         }
         let doc = format!("width within which the error of the kernel is weighed, {where_any}");
         columns.push(number("support", length, &doc).or_null());
         columns
+    }
+
+    /// Names of bandwidths along directions, and what they are along.
+    fn local_axes(&self) -> &'static [(&'static str, &'static str)] {
+        match (self.is_oriented, self.axes.len()) {
+            (false, _) => &[],
+            (_, 3) => &[
+                ("along", "along its direction"),
+                ("sideways", "across its direction, in the plane of the first two axes"),
+                ("upwards", "across both"),
+            ],
+            _ => &[("along", "along its direction"), ("across", "across its direction")],
+        }
     }
 
     /// Columns of some cells, their numbers rising.
@@ -114,7 +145,10 @@ impl DensityTable {
             Arc::new(own.iter().map(|cell| cell.and_then(value)).collect::<Float64Array>())
         };
         for axis in 0..self.axes.len() {
-            arrays.push(of_cells(&|cell| cell.bandwidth.get(axis).copied()));
+            arrays.push(of_cells(&|cell| cell.bandwidth.get(axis).copied().filter(|h| *h > 0.0)));
+        }
+        for axis in self.axes.iter().enumerate().filter(|_| self.is_oriented).map(|(axis, _)| axis) {
+            arrays.push(of_cells(&|cell| cell.direction.get(axis).copied()));
         }
         arrays.push(of_cells(&|cell| Some(cell.support).filter(|support| *support > 0.0)));
         arrays

@@ -89,7 +89,33 @@ fn what_ends_absorb_is_told() {
         folder.lamella(&arguments).exits(0)
     };
     of("absorb").gives("% of the weight is beyond ends that absorb");
+    of("reflect:absorb,reflect").gives("outside of the domain are left out");
     of("reflect").gives("settled").gives("outside of the domain are left out");
+}
+
+/// Ends hold a density, in its unit: it is found there.
+#[test]
+fn ends_hold_a_density() {
+    let folder = Folder::new();
+    // Even points on a kilometre: 1.6 per metre.
+    let points: String = (0..1600).map(|i| format!("{}\n", (f64::from(i) + 0.5) / 1600.0)).collect();
+    folder.write("points.csv", format!("x\n{points}"));
+    let of = |ends: &str| {
+        let arguments =
+            ["density", "points.csv", "--out", "d.parquet", "--domain", "0..1 km", "--cells", "400"];
+        folder.lamella(&[&arguments[..], &["--ends", ends]].concat()).exits(0);
+        columns(&folder.path("d.parquet"), &["density"]).remove(0)
+    };
+    for (ends, expected) in [
+        ("hold 1.6 m^-1", [1.6, 1.6]),
+        ("hold 3.2 m^-1:hold 800 km^-1", [3.2, 0.8]),
+        ("hold 1.6:reflect", [1.6, 1.6]),
+    ] {
+        let found = of(ends);
+        for (own, expected) in [found[0], found[399]].into_iter().zip(expected) {
+            assert!((own / expected - 1.0).abs() < 0.05, "{ends}: {own} for {expected}");
+        }
+    }
 }
 
 /// A table of ours says its units; a scene's particles are points of a density.
@@ -146,6 +172,46 @@ fn particles_of_a_run_have_a_density() {
     of("0..100 s, 0..40 s", &[]).exits(2).says("column `x` is in m, and --domain says s");
 }
 
+/// Kernels follow a direction that is given, or that columns of velocity have; the table says which, and how wide they are.
+#[test]
+fn kernels_follow_directions() {
+    let folder = Folder::new();
+    // Denser from corner to corner; all cells have points, so that no row is without a kernel. Upstream of x = 4 nothing moves.
+    let mut text = "x,y,u,v\n".to_owned();
+    for i in 0..64 {
+        for k in 0..1 + 6 / (1 + (i / 8 - i % 8_i32).unsigned_abs()) {
+            let (x, y) = (f64::from(i / 8) + 0.5, f64::from(i % 8) + 0.5);
+            let speed = if x < 4.0 { 0.0 } else { 1.0 + f64::from(k) };
+            text += &format!("{x},{y},{},{}\n", 3.0 * speed, 4.0 * speed);
+        }
+    }
+    folder.write("points.csv", text);
+    let of = |more: &[&str]| {
+        let arguments =
+            ["density", "points.csv", "--out", "d.parquet", "--domain", "0..8, 0..8", "--cells", "8,8"];
+        folder.lamella(&[&arguments, more].concat()).exits(0);
+        let kernels = ["density", "bandwidth_along", "bandwidth_across"];
+        columns(&folder.path("d.parquet"), &kernels)
+    };
+    let [angle, components] = [&["--direction", "45deg"][..], &["--direction", "-2,-2"]].map(of);
+    for (own, other) in angle.iter().flatten().zip(components.iter().flatten()) {
+        assert!((own / other - 1.0).abs() < 1e-9, "{own}, {other}");
+    }
+    let mass: f64 = angle[0].iter().sum();
+    assert!((mass - (mass.round())).abs() < 1e-10 * mass, "{mass}");
+    assert!(angle[1][36] > 1.02 * angle[2][36], "{} along, {} across", angle[1][36], angle[2][36]);
+    let directions = columns(&folder.path("d.parquet"), &["direction_x", "direction_y"]);
+    assert!(directions.iter().flatten().all(|part| (part.abs() - 0.5_f64.sqrt()).abs() < 1e-12));
+    let file = std::fs::read(folder.path("d.parquet")).expect("the table");
+    assert!(file.windows(24).any(|own| own == br#""direction":["-2","-2"],"#.as_slice()));
+
+    // Where nothing moves kernels are round, and have no direction.
+    let found = of(&["--velocity", "u,v"]);
+    for (idx, (along, across)) in found[1].iter().zip(&found[2]).enumerate() {
+        assert_eq!(along == across, idx < 32, "cell {idx}: {along}, {across}");
+    }
+}
+
 #[test]
 fn what_is_wrong_is_said_in_one_sentence() {
     let folder = Folder::new();
@@ -190,5 +256,36 @@ fn what_is_wrong_is_said_in_one_sentence() {
         let arguments = [&["density"], *arguments, &["--out", "density.parquet"]].concat();
         folder.lamella(&arguments).exits(*code).says(text);
         assert!(!folder.path("density.parquet").exists());
+    }
+}
+
+#[test]
+fn directions_and_ends_that_are_none_are_refused() {
+    let folder = Folder::new();
+    folder.write("near.csv", "x,z\n1,1\n5,5\n");
+    let plane = ["near.csv", "--domain", "0..9,0..9", "--cells", "4,4", "--columns", "x,z"];
+    let of_plane = |more: &[&'static str]| [&plane, more].concat();
+    let directions: [(Vec<&str>, &str); 12] = [
+        (
+            vec!["near.csv", "--domain", "0..9", "--cells", "4", "--direction", "1"],
+            "on a line there is one direction",
+        ),
+        (of_plane(&["--ends", "hold"]), "`hold` is no end"),
+        (of_plane(&["--ends", "hold -1"]), "a number of zero or more"),
+        (of_plane(&["--ends", "hold 1 kg/m^2"]), "an end holds a density in kg/m^2"),
+        (of_plane(&["--ends", "reflect:periodic"]), "both are periodic, or none"),
+        (of_plane(&["--ends", "hold 1", "--kernel", "histogram"]), "--ends hold is for kernels that differ"),
+        (of_plane(&["--direction", "north"]), "`north` is no angle"),
+        (of_plane(&["--direction", "1,2,3"]), "--direction has 3 components for 2 axes"),
+        (of_plane(&["--direction", "0,0"]), "zero length"),
+        (of_plane(&["--velocity", "x"]), "--velocity has 1 columns for 2 axes"),
+        (of_plane(&["--direction", "1,0", "--kernel", "round"]), "for --kernel adaptive"),
+        (of_plane(&["--direction", "1,0", "--velocity", "x,z"]), "cannot be used with"),
+    ];
+    for (arguments, text) in directions {
+        folder
+            .lamella(&[&["density"], &arguments[..], &["--out", "density.parquet"]].concat())
+            .exits(2)
+            .says(text);
     }
 }

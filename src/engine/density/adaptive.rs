@@ -8,8 +8,11 @@ use super::classes::{Fill, Table, bandwidth_of, class_of};
 use super::curvature::{Curvatures, curvatures};
 use super::frame::Frame;
 use super::global::histogram;
-use super::lattice::{AXES, Field, Lattice, Window};
+use super::held::{Held, turned_over};
+use super::kinds::{Adaptive, Cell, Estimate, Start};
+use super::lattice::{AXES, End, Field, Lattice, Window};
 use super::limits::{GROWTH, Limits};
+use super::local::Basis;
 use super::smoothed::Smoothed;
 use super::stencil::scatter;
 use super::tally::{Tally, Weighing};
@@ -19,121 +22,19 @@ use crate::maths::wide::Width;
 use std::f64::consts::PI;
 
 /// Cells that a thread takes at once.
-const PORTION: usize = 64;
+pub(super) const PORTION: usize = 64;
+
+/// Of the largest density, what one is at least where particles are.
+const LEAST: f64 = 1e-9;
 
 /// From this loop on the running mean of the error may end the iteration.
 const RUNNING: usize = 8;
 
-/// Which formulas are taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Variant {
-    /// As published: curvatures without a mean and with the right square, shapes that are least rough.
-    #[default]
-    Corrected,
-    /// As in the released program, with its defects, to compare.
-    Released,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Shape {
-    /// Kernels may be longer along one axis than along another.
-    #[default]
-    Stretched,
-    Round,
-}
-
-/// The bandwidths of the first loop.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub enum Start {
-    /// That of a normal density with the cloud's standard deviations.
-    #[default]
-    NormalReference,
-    /// So much of it.
-    Times(f64),
-    /// m
-    Bandwidth(f64),
-}
-
-/// How kernels are found.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Adaptive {
-    pub variant: Variant,
-    pub shape: Shape,
-    pub start: Start,
-    pub weighing: Weighing,
-    /// Bounds of all bandwidths, m.
-    pub bounds: Option<[f64; 2]>,
-    /// Wide kernels are summed on coarse cells.
-    pub is_fast: bool,
-    /// Relative change of a loop that ends the iteration; zero for never.
-    pub tolerance: f64,
-    pub most_loops: usize,
-}
-
-impl Default for Adaptive {
-    fn default() -> Self {
-        Self {
-            variant: Variant::default(),
-            shape: Shape::default(),
-            start: Start::default(),
-            weighing: Weighing::default(),
-            bounds: None,
-            is_fast: true,
-            tolerance: 0.02,
-            most_loops: 20,
-        }
-    }
-}
-
-/// What is known of a cell with particles.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Cell {
-    pub at: [usize; AXES],
-    /// Bandwidth, m: the geometric mean of those along axes.
-    pub h: f64,
-    /// Bandwidths over it.
-    pub s: [f64; AXES],
-    /// Width of the support within which errors are weighed, m.
-    pub sigma: f64,
-    /// Bandwidths of curvatures, m.
-    pub g: [f64; AXES],
-    /// Classes of bandwidths, where they are rounded.
-    pub h_class: [i64; AXES],
-    pub g_class: [i64; AXES],
-    /// Density, and its mean over the support; counts per m^d.
-    pub rho: f64,
-    pub n: f64,
-    /// Net roughness Λ, and locally averaged products of curvatures, by rows of the lower triangle.
-    pub roughness: f64,
-    pub psi: [f64; 6],
-}
-
-/// A density, and how it was found.
-#[derive(Debug, Clone)]
-pub struct Estimate {
-    /// Mass per m^d, by cell of the lattice, and its standard error by the numbers of particles.
-    pub density: Vec<f64>,
-    pub standard_error: Vec<f64>,
-    /// By cell with particles, in the order of the tally.
-    pub cells: Vec<Cell>,
-    /// Mean bandwidth over cells with particles after each loop, m, that of the start first.
-    pub history: Vec<f64>,
-    /// Whether the last loop changed less than the tolerance.
-    pub is_settled: bool,
-}
-
-impl Estimate {
-    /// Of particles whose masses are not finite and above zero.
-    fn unknown(lattice: &Lattice) -> Self {
-        let none = vec![f64::NAN; lattice.n_cells()];
-        let (density, standard_error) = (none.clone(), none);
-        Self { density, standard_error, cells: Vec::new(), history: vec![f64::NAN], is_settled: false }
-    }
-}
-
 pub(super) struct Search<'a> {
     pub(super) lattice: &'a Lattice,
     pub(super) adaptive: &'a Adaptive,
+    /// Whether kernels have axes of their own.
+    pub(super) is_oriented: bool,
     pub(super) limits: Limits,
     pub(super) integral: Integral,
     pub(super) width: Width,
@@ -141,6 +42,9 @@ pub(super) struct Search<'a> {
     pub(super) cells: Vec<Cell>,
     /// The density with their kernels.
     pub(super) rho: (Window, Field),
+    /// Walls that hold a value, and counts per mass, as values are of mass.
+    pub(super) held: Option<Held>,
+    pub(super) per_mass: f64,
     pub(super) d: f64,
     pub(super) constants: Constants,
 }
@@ -164,8 +68,7 @@ impl Constants {
 
 /// The density of particles that are counted on a lattice.
 pub fn estimate(lattice: &Lattice, tally: &Tally, adaptive: &Adaptive, width: Width) -> Estimate {
-    let takes_cells = adaptive.shape == Shape::Stretched && adaptive.variant == Variant::Corrected;
-    let frame = Frame::new(lattice, tally, takes_cells);
+    let frame = Frame::new(lattice, tally, adaptive.takes_cells());
     if frame.is_point() {
         let (density, standard_error) = histogram(lattice, tally);
         return Estimate { density, standard_error, cells: Vec::new(), history: vec![0.0], is_settled: true };
@@ -183,32 +86,40 @@ pub fn estimate(lattice: &Lattice, tally: &Tally, adaptive: &Adaptive, width: Wi
             *limit = bounds.map(|bound| (bound / scale).clamp(limit[0], limit[1]));
         }
     }
-    frame.restore(solve(own_lattice, own_tally, (&own, limits), width))
+    // On a line there is one direction.
+    let is_oriented = adaptive.is_oriented() && own_lattice.d > 1;
+    let n_bases = if is_oriented { tally.cells.len() } else { 0 };
+    let bases: Vec<(Basis, bool)> = (0..n_bases).map(|idx| adaptive.orientation.basis(idx, &frame)).collect();
+    let found = solve((own_lattice, own_tally), (&own, limits), is_oriented.then_some(&bases), width);
+    frame.restore(found, is_oriented)
 }
 
 fn solve(
-    lattice: &Lattice,
-    tally: &Tally,
+    (lattice, tally): (&Lattice, &Tally),
     (adaptive, limits): (&Adaptive, Limits),
+    bases: Option<&Vec<(Basis, bool)>>,
     width: Width,
 ) -> Estimate {
     let (counts, unit) = tally.pseudo_counts(adaptive.weighing);
     let mut search = Search {
         lattice,
         adaptive,
+        is_oriented: bases.is_some(),
         limits,
         integral: Integral::new(),
         width,
         counts,
         cells: Vec::new(),
         rho: Default::default(),
+        held: None,
+        per_mass: 1.0,
         d: lattice.d as f64,
         constants: Constants::new(lattice.d as f64),
     };
     if search.counts.iter().any(|count| !(count.is_finite() && *count > 0.0)) {
         return Estimate::unknown(lattice);
     }
-    search.begin(tally);
+    search.begin(tally, bases);
     let mut history = vec![search.mean_bandwidth()];
     let mut ends = Ends::default();
     let mut is_settled = false;
@@ -225,7 +136,7 @@ fn solve(
 }
 
 impl Search<'_> {
-    fn begin(&mut self, tally: &Tally) {
+    fn begin(&mut self, tally: &Tally, bases: Option<&Vec<(Basis, bool)>>) {
         let (lattice, d) = (self.lattice, self.d);
         let deviations = tally.deviations();
         let n: f64 = self.counts.iter().sum();
@@ -239,11 +150,18 @@ impl Search<'_> {
         };
         let cell = |&idx: &u32| {
             let sigma = (2.0 * h).clamp(self.limits.support[0], self.limits.support[1]);
-            let mut cell = Cell { at: lattice.cell(idx as usize), sigma, ..Cell::default() };
-            self.limit(&mut cell, [h; AXES]);
+            let mut cell = Cell { at: lattice.cell(idx as usize), sigma, h, ..Cell::default() };
+            if bases.is_none() {
+                self.limit(&mut cell, [h; AXES]);
+            }
             cell
         };
         self.cells = tally.cells.iter().map(cell).collect();
+        let places: Vec<[usize; AXES]> = self.cells.iter().map(|cell| cell.at).collect();
+        (self.held, self.per_mass) = (Held::new(lattice, &places), n / tally.mass());
+        if let Some(bases) = bases {
+            self.turn(bases);
+        }
         if !self.cells.is_empty() {
             self.spread();
         }
@@ -255,6 +173,9 @@ impl Search<'_> {
 
     /// Bandwidths along axes within their bounds, and what follows from them.
     fn limit(&self, cell: &mut Cell, h: [f64; AXES]) {
+        if self.is_oriented {
+            return self.limit_along(cell, h);
+        }
         let smallest = self.lattice.smallest();
         let mut product = 1.0;
         let mut own = [1.0; AXES];
@@ -292,15 +213,30 @@ impl Search<'_> {
         let range = (self.limits.support[0].max(0.5 * least), GROWTH * most);
         let rho = Smoothed::new(tools, (self.adaptive.is_fast, &window), rho, range);
         self.for_all(&|search, cell, taps| {
-            let n = rho.at(tools, cell, taps);
+            let n = rho.at(tools, cell, taps) + search.beyond(cell);
             search.widen(cell, n);
-            cell.n = rho.at(tools, cell, taps);
+            cell.n = rho.at(tools, cell, taps) + search.beyond(cell);
             search.choose_curvature(cell);
         });
         drop(rho);
+        if self.is_oriented {
+            self.average_along();
+        } else {
+            self.average(tools);
+        }
+        self.for_all(&|search, cell, _| search.choose(cell));
+        self.fill_smooth();
+        self.spread();
+    }
+
+    /// Locally averaged products of curvatures along axes.
+    fn average(&mut self, tools: (&Lattice, Integral, Width)) {
         let settings = (self.adaptive.variant, self.adaptive.is_fast);
-        let Curvatures { window, fields } = curvatures(tools, settings, &self.cells, &self.counts);
+        let held = self.held.as_ref().map(|held| (held, self.per_mass));
+        let Curvatures { window, fields } = curvatures(tools, settings, (&self.cells, &self.counts), held);
         let range = self.widths();
+        let lattice = behind_walls(self.lattice);
+        let tools = (&lattice, self.integral, self.width);
         let mut place = 0;
         for i in 0..fields.len() {
             for j in 0..=i {
@@ -311,19 +247,19 @@ impl Search<'_> {
                 place += 1;
             }
         }
-        self.for_all(&|search, cell, _| search.choose(cell));
-        self.fill_smooth();
-        self.spread();
     }
 
     /// Supports: the narrowest and the widest, m.
-    fn widths(&self) -> (f64, f64) {
+    pub(super) fn widths(&self) -> (f64, f64) {
         let sigmas = || self.cells.iter().map(|cell| cell.sigma);
         (sigmas().fold(f64::INFINITY, f64::min), sigmas().fold(0.0, f64::max))
     }
 
     /// Fine cells that kernels reach.
     fn reach(&self) -> [usize; AXES] {
+        if self.is_oriented {
+            return self.reach_along();
+        }
         let mut most = [0.0_f64; AXES];
         for cell in &self.cells {
             for axis in self.lattice.axes() {
@@ -351,17 +287,28 @@ impl Search<'_> {
 
     /// The density with the kernels as they are.
     fn spread(&mut self) {
-        let window = Window::around(self.lattice, self.cells.iter().map(|cell| cell.at), self.reach());
-        let field = self.density_of(&self.counts, &window, false);
+        let mut window = Window::around(self.lattice, self.cells.iter().map(|cell| cell.at), self.reach());
+        if self.held.is_some() {
+            window = Window { first: [0; AXES], end: self.lattice.cells };
+        }
+        let field = self.density_of((&self.counts, self.per_mass), &window, false);
+        let most = field.values.iter().fold(0.0, |most: f64, value| most.max(*value));
         for cell in &mut self.cells {
             let [x, y, z] = cell.at;
             cell.rho = field.values[field.row(x, y) + z - field.first[2]];
+            // Kernels that are turned may have more behind an end that changes signs than before it.
+            if self.is_oriented {
+                cell.rho = cell.rho.max(LEAST * most);
+            }
         }
         self.rho = (window, field);
     }
 
     /// `ρ = Σ_b c_b W_b/V_c` on a window, or `Σ_b c_b W_b²/V_c²`.
-    fn density_of(&self, counts: &[f64], window: &Window, is_squared: bool) -> Field {
+    fn density_of(&self, (counts, per_mass): (&[f64], f64), window: &Window, is_squared: bool) -> Field {
+        if self.is_oriented {
+            return self.density_along((counts, per_mass), window, is_squared);
+        }
         let lattice = self.lattice;
         let mut fields = [Field::zeros(window, [1; AXES])];
         let volume = lattice.volume();
@@ -388,8 +335,53 @@ impl Search<'_> {
                 }
             }
         });
+        // What walls hold does not scatter.
+        if let Some(held) = self.held.as_ref().filter(|_| !is_squared) {
+            self.add_held((held, per_mass), fill, &mut fields[0]);
+        }
         let [field] = fields;
         field
+    }
+
+    /// Adds what walls hold.
+    ///
+    /// - Equation: `2 ρ_w I/N`, `I` kernels of all cells that the wall has turned over, `N` those and the others.
+    /// - Symbols: `ρ_w` density of the wall.
+    /// - Range: N differs from one only where bandwidths differ from cell to cell.
+    /// - Source: methods, section 4.7; at the wall I is half of N, and what is smoothed is zero: there is ρ_w.
+    /// - Shape: falls from the wall on.
+    fn add_held(&self, (held, per_mass): (&Held, f64), fill: Fill, field: &mut Field) {
+        let (lattice, reach) = (self.lattice, self.reach());
+        let mirrored = mirrored(lattice);
+        let window = Window { first: [0; AXES], end: lattice.cells };
+        for &wall in &held.walls {
+            let spread = |lattice: &Lattice, depth: usize, is_behind: bool| {
+                let sources = held.before(lattice, wall, depth);
+                let mut fields = [Field::zeros(&window, [1; AXES])];
+                scatter((sources.len(), self.width), &mut fields, &|idx, spread| {
+                    let ((at, owner), line) = (sources[idx], |axis| Line::of(lattice, axis, 1));
+                    let cell = &self.cells[owner];
+                    spread.weight = 1.0;
+                    spread.taps[0][..AXES - lattice.d].iter_mut().for_each(|lent| lent.own.be_one());
+                    for axis in lattice.axes() {
+                        let own = cell.h * cell.s[axis] / lattice.edge[axis];
+                        let side = (is_behind && axis == wall.axis).then_some(wall.side);
+                        turned_over(line(axis), own, (at[axis], side), fill, &mut spread.taps[0][axis].own);
+                    }
+                });
+                let [field] = fields;
+                field
+            };
+            let reach = reach[wall.axis];
+            let (behind, all) = (spread(lattice, reach, true), spread(&mirrored, 2 * reach, false));
+            add_ratio(field, (&behind, &all), 2.0 * wall.value * per_mass);
+        }
+    }
+
+    /// What the support of a cell has of walls that hold a value.
+    fn beyond(&self, cell: &Cell) -> f64 {
+        let of = |held: &Held| held.beyond(self.lattice, self.integral, cell.at, cell.sigma);
+        self.held.as_ref().map_or(0.0, |held| self.per_mass * of(held))
     }
 
     /// Kernels of all classes along an axis, if bandwidths are rounded.
@@ -409,22 +401,49 @@ impl Search<'_> {
 
     fn finish(self, tally: &Tally, unit: f64, (history, is_settled): (Vec<f64>, bool)) -> Estimate {
         let all = Window { first: [0; AXES], end: self.lattice.cells };
-        let (counts, unit) = match self.adaptive.weighing {
-            Weighing::OfAll | Weighing::Mean => (&self.counts, unit),
-            Weighing::Number | Weighing::OfCell => (&tally.masses, 1.0),
+        let (counts, unit, per_mass) = match self.adaptive.weighing {
+            Weighing::OfAll | Weighing::Mean => (&self.counts, unit, self.per_mass),
+            Weighing::Number | Weighing::OfCell => (&tally.masses, 1.0, 1.0),
         };
         let n = self.lattice.n_cells();
         let (mut density, mut standard_error) = (vec![0.0; n], vec![0.0; n]);
         if !self.cells.is_empty() {
-            density = self.density_of(counts, &all, false).values;
+            density = self.density_of((counts, per_mass), &all, false).values;
             density.truncate(n);
             density.iter_mut().for_each(|value| *value *= unit);
-            standard_error = self.density_of(&tally.squares, &all, true).values;
+            if self.held.is_some() || self.is_oriented {
+                density.iter_mut().for_each(|value| *value = value.max(0.0));
+            }
+            standard_error = self.density_of((&tally.squares, 0.0), &all, true).values;
             standard_error.truncate(n);
             standard_error.iter_mut().for_each(|value| *value = tally.largest * value.sqrt());
         }
         Estimate { density, standard_error, cells: self.cells, history, is_settled }
     }
+}
+
+/// Adds a ratio where there is one, so many times.
+pub(super) fn add_ratio(field: &mut Field, (own, all): (&Field, &Field), factor: f64) {
+    for ((sum, own), all) in field.values.iter_mut().zip(&own.values).zip(&all.values) {
+        if *own > 0.0 {
+            *sum += factor * own / all;
+        }
+    }
+}
+
+/// A lattice whose ends keep signs.
+pub(super) fn mirrored(lattice: &Lattice) -> Lattice {
+    let mut own = lattice.clone();
+    own.ends.as_flattened_mut().iter_mut().filter(|end| end.is_odd()).for_each(|end| *end = End::Mirror);
+    own
+}
+
+/// The lattice as products of curvatures see it: behind a wall that holds a value they are what they are before it.
+pub(super) fn behind_walls(lattice: &Lattice) -> Lattice {
+    let mut own = lattice.clone();
+    let held = own.ends.as_flattened_mut().iter_mut().filter(|end| matches!(end, End::Held(_)));
+    held.for_each(|end| *end = End::Mirror);
+    own
 }
 
 /// What ends the iteration.

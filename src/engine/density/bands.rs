@@ -70,7 +70,7 @@ impl Band {
         let (other, sign) = match end {
             End::Mirror => (mirrored, 1.0),
             End::Wrap => (shifted, 1.0),
-            End::Sink => (mirrored, -1.0),
+            End::Sink | End::Held(_) => (mirrored, -1.0),
         };
         (other >= 0 && other < n).then_some((other as usize, sign))
     }

@@ -2,8 +2,9 @@
 //!
 //! Owns these formulas. May use roughness and classes. It deliberately sums nothing.
 
-use super::adaptive::{Cell, Search, Shape, Variant};
+use super::adaptive::Search;
 use super::classes::{bandwidth_of, class_of};
+use super::kinds::{Cell, Shape, Variant};
 use super::lattice::AXES;
 use super::limits::GROWTH;
 use super::rough::{crossed, net_roughness};
@@ -34,6 +35,9 @@ impl Search<'_> {
         let beta = 2.0 / ((d + 4.0) * (d + 6.0));
         let virtual_n = d * ln((8.0 * PI).sqrt() * cell.sigma) + 2.0 * ln(cell.n) - ln(cell.rho);
         let common = self.constants.curvature + beta * virtual_n + ln(cell.h);
+        if self.is_oriented {
+            return self.choose_curvature_along(cell, common);
+        }
         let smallest = self.lattice.smallest();
         let [low, high] = self.limits.curvature.map(ln);
         for axis in self.lattice.axes() {
@@ -57,7 +61,8 @@ impl Search<'_> {
         let psi = cell.psi;
         let psi = &psi[..d * (d + 1) / 2];
         let own: Vec<f64> = (0..d).map(|i| psi[i * (i + 3) / 2]).collect();
-        let is_round = self.adaptive.shape == Shape::Round || own.iter().any(|&psi| psi <= 0.0);
+        let is_round =
+            self.adaptive.shape == Shape::Round || cell.is_stagnant || own.iter().any(|&psi| psi <= 0.0);
         let is_released = self.adaptive.variant == Variant::Released;
         let round = own.iter().sum::<f64>() + 2.0 * crossed(psi, d);
         let mut roughness = if is_round { round } else { net_roughness(psi, &own, is_released) };

@@ -2,9 +2,10 @@
 //!
 //! Owns these fields. May use stencils. It deliberately chooses no bandwidth.
 
-use super::adaptive::{Cell, Variant};
 use super::bands::{Band, smooth};
 use super::classes::{Fill, Table};
+use super::held::{Held, Wall, turned_over};
+use super::kinds::{Cell, Variant};
 use super::lattice::{AXES, Field, Lattice, Window};
 use super::stencil::{Lent, scatter};
 use super::taps::{CURVATURE_REACH, Curvature, Integral, Line, Smooth, Taps};
@@ -39,15 +40,20 @@ pub struct Curvatures {
 pub fn curvatures(
     tools: (&Lattice, Integral, Width),
     (variant, is_fast): (Variant, bool),
-    cells: &[Cell],
-    counts: &[f64],
+    (cells, counts): (&[Cell], &[f64]),
+    held: Option<(&Held, f64)>,
 ) -> Curvatures {
     let (lattice, integral, width) = tools;
     let first = AXES - lattice.d;
     let most = cells.iter().flat_map(|cell| &cell.g[first..]).fold(0.0_f64, |most, &g| most.max(g));
     let more = lattice.edge.map(|edge| (CURVATURE_REACH * most / edge).ceil() as usize + 1);
-    let window = Window::around(lattice, cells.iter().map(|cell| cell.at), more);
-    let narrowest = if is_fast { narrowest(lattice, cells, &window) } else { f64::INFINITY };
+    let mut window = Window::around(lattice, cells.iter().map(|cell| cell.at), more);
+    if held.is_some() {
+        window = Window { first: [0; AXES], end: lattice.cells };
+    }
+    // What walls hold is found with the same kernels, one by one, as it cancels most of what is mirrored.
+    let narrowest =
+        if is_fast && held.is_none() { narrowest(lattice, cells, &window) } else { f64::INFINITY };
     let is_narrow = |cell: &Cell| cell.g[first..].iter().any(|&g| g < narrowest);
     let (narrow, wide): (Vec<usize>, Vec<usize>) = (0..cells.len()).partition(|&idx| is_narrow(&cells[idx]));
     let of_wide = |along| {
@@ -68,6 +74,16 @@ pub fn curvatures(
             kernels.lend(&cells[idx], along, &mut spread.taps[along - first]);
         }
     });
+    for (held, wall) in held.iter().flat_map(|held| held.0.walls.iter().map(move |wall| (held, wall))) {
+        let sources = held.0.before(lattice, *wall, more[wall.axis]);
+        scatter((sources.len(), width), &mut fields, &|idx, spread| {
+            let (at, owner) = sources[idx];
+            spread.weight = 2.0 * wall.value * held.1;
+            for along in first..AXES {
+                kernels.turn_over(&cells[owner], along, (at, wall), &mut spread.taps[along - first]);
+            }
+        });
+    }
     Curvatures { window, fields }
 }
 
@@ -146,6 +162,26 @@ impl<'a> Kernels<'a> {
                 Some(table) => table.lend(line, cell.g_class[along], b, &mut taps[axis], fill),
                 None => fill(line, own, b, &mut taps[axis].own),
             }
+        }
+    }
+}
+
+impl Kernels<'_> {
+    /// The same of a cell behind a wall.
+    fn turn_over(
+        &self,
+        cell: &Cell,
+        along: usize,
+        (at, wall): ([usize; AXES], &Wall),
+        taps: &mut [Lent; AXES],
+    ) {
+        let lattice = self.lattice;
+        taps[..AXES - lattice.d].iter_mut().for_each(|lent| lent.own.be_one());
+        for axis in lattice.axes() {
+            let place = (at[axis], (axis == wall.axis).then_some(wall.side));
+            let fill: Fill = &|line, own, b, taps| self.work_out((along, axis), (line, own), b, taps);
+            let own = cell.g[along] / lattice.edge[axis];
+            turned_over(Line::of(lattice, axis, 1), own, place, fill, &mut taps[axis].own);
         }
     }
 }

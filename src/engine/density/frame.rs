@@ -5,7 +5,7 @@
 //! Supports and kernels of curvatures have one width along all axes. That is a width in cells where kernels may be stretched:
 //! of a thin layer a metre along it is not what a metre across it is. An axis of one cell tells nothing of a density.
 
-use super::adaptive::{Cell, Estimate};
+use super::kinds::{Cell, Estimate};
 use super::lattice::{AXES, End, Lattice};
 use super::tally::Tally;
 use crate::maths::vector::pow;
@@ -34,6 +34,14 @@ impl<'a> Frame<'a> {
             let axes: Vec<(usize, f64, [End; 2])> = frame.kept.iter().zip(&frame.scales).map(axis).collect();
             frame.reduced =
                 Lattice::new(&axes).map(|lattice| (lattice, tally.along(&frame.kept, &frame.scales)));
+            let per = frame.per_volume();
+            if let Some((lattice, _)) = &mut frame.reduced {
+                for end in lattice.ends.as_flattened_mut() {
+                    if let End::Held(value) = end {
+                        *value /= per;
+                    }
+                }
+            }
         }
         frame
     }
@@ -54,7 +62,11 @@ impl<'a> Frame<'a> {
     }
 
     /// An estimate on the reduced lattice as one on the original.
-    pub fn restore(&self, mut found: Estimate) -> Estimate {
+    pub fn restore(&self, mut found: Estimate, is_oriented: bool) -> Estimate {
+        let unit = |axis: usize| std::array::from_fn(|other| if other == axis { 1.0 } else { 0.0 });
+        for cell in found.cells.iter_mut().filter(|_| !is_oriented) {
+            self.kept.iter().for_each(|&axis| cell.axes[axis] = unit(axis));
+        }
         let Some((lattice, _)) = &self.reduced else { return found };
         let (mean, ratio) = (self.mean(), self.per_volume());
         found.density.iter_mut().chain(&mut found.standard_error).for_each(|value| *value *= ratio);
@@ -65,8 +77,19 @@ impl<'a> Frame<'a> {
             // One cell along an axis has no bandwidth.
             let mut at = [0; AXES];
             (cell.s, cell.g) = ([0.0; AXES], [0.0; AXES]);
+            if is_oriented {
+                cell.axes = [[0.0; AXES]; AXES];
+            }
             for (k, (&axis, scale)) in self.kept.iter().zip(&self.scales).enumerate() {
                 at[axis] = own.at[first + k];
+                if is_oriented {
+                    // Axes are no unit vectors where lengths along them differ; bandwidths are along what they are in metres.
+                    (cell.s[axis], cell.g[axis]) = (own.s[first + k], own.g[first + k] * mean);
+                    for (i, (&other, scale)) in self.kept.iter().zip(&self.scales).enumerate() {
+                        cell.axes[axis][other] = own.axes[first + k][first + i] * scale / mean;
+                    }
+                    continue;
+                }
                 cell.s[axis] = own.s[first + k] * scale / mean;
                 cell.g[axis] = own.g[first + k] * scale;
             }

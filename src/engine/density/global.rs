@@ -3,10 +3,10 @@
 //! Owns the rules by which that size is found. May use spectra, limits and bands. It deliberately lets kernels differ along
 //! axes, but nowhere else.
 
-use super::adaptive::Shape;
 use super::bands::{Band, smooth};
 use super::frame::Frame;
-use super::lattice::{AXES, Field, Lattice, Window};
+use super::kinds::Shape;
+use super::lattice::{AXES, End, Field, Lattice, Window};
 use super::limits::Limits;
 use super::spectrum::Spectrum;
 use super::tally::{Tally, Weighing};
@@ -52,6 +52,8 @@ pub enum Trouble {
     Bandwidth,
     /// The rule is for lattices of one axis.
     OnlyOnALine,
+    /// An end holds a value: what such a density is made of is known of kernels that differ alone.
+    Held,
     /// Masses are not finite.
     Masses,
     /// Particles were counted on other cells.
@@ -65,6 +67,7 @@ impl std::fmt::Display for Trouble {
         f.write_str(match self {
             Self::Bandwidth => "the bandwidth is not a number above zero",
             Self::OnlyOnALine => "this rule finds a bandwidth on a line, not in a plane or in space",
+            Self::Held => "ends that hold a value are for kernels that differ from place to place",
             Self::Masses => "masses of particles, or their sums, are not finite",
             Self::TooFine => {
                 "cells are so fine that a kernel reaches more than two thousand: fewer cells show as much"
@@ -161,6 +164,9 @@ pub fn histogram(lattice: &Lattice, tally: &Tally) -> (Vec<f64>, Vec<f64>) {
 
 fn check(lattice: &Lattice, tally: &Tally) -> Result<(), Trouble> {
     let n = lattice.n_cells();
+    if lattice.ends.as_flattened().iter().any(|end| matches!(end, End::Held(_))) {
+        return Err(Trouble::Held);
+    }
     if tally.cells.iter().any(|&cell| cell as usize >= n) {
         return Err(Trouble::OtherCells);
     }

@@ -91,6 +91,12 @@ impl Ladder {
     /// - Source: where all is even F hangs on no width, and far from all that there is `ln F` goes as `−r²/2σ²`.
     /// - Shape: one value.
     pub fn read(&self, lattice: &Lattice, cell: [usize; AXES], deviation: f64) -> f64 {
+        let ([narrow, wide], t) = self.between(lattice, cell, deviation);
+        blended(narrow, wide, t)
+    }
+
+    /// The field at a cell on the two rungs that enclose a width, and where between them it is read.
+    pub fn between(&self, lattice: &Lattice, cell: [usize; AXES], deviation: f64) -> ([f64; 2], f64) {
         let place = 2.0 * ln((deviation / self.narrowest).max(1.0)) / std::f64::consts::LN_2;
         let below = (place as usize).clamp(self.first, self.first + self.rungs.len() - 2) - self.first;
         let [low, high] = [&self.rungs[below], &self.rungs[below + 1]];
@@ -99,9 +105,14 @@ impl Ladder {
         let (narrow, wide) = (read(&low.field, &at_low), read(&high.field, &at_high));
         let ratio = self.narrowest * power(below + self.first) / deviation;
         // From 1 at the narrower one to ½ at the wider one.
-        let t = (2.0 * (1.0 - ratio * ratio)).clamp(0.0, 1.0);
-        if narrow * wide > 0.0 { narrow * exp(t * ln(wide / narrow)) } else { (1.0 - t) * narrow + t * wide }
+        ([narrow, wide], (2.0 * (1.0 - ratio * ratio)).clamp(0.0, 1.0))
     }
+}
+
+/// What lies between two values.
+#[inline(always)]
+pub fn blended(narrow: f64, wide: f64, t: f64) -> f64 {
+    if narrow * wide > 0.0 { narrow * exp(t * ln(wide / narrow)) } else { (1.0 - t) * narrow + t * wide }
 }
 
 /// `2^{k/2}`
@@ -152,11 +163,9 @@ impl Rung {
                 let after = own + first + k;
                 let (at, sign) = match (after, lattice.ends[axis]) {
                     (0, [End::Wrap, _]) => (n_all - 1, 1.0),
-                    (0, [end, _]) => (0, if end == End::Sink { -1.0 } else { 1.0 }),
+                    (0, [end, _]) => (0, if end.is_odd() { -1.0 } else { 1.0 }),
                     (after, [_, End::Wrap]) if after > n_all => (0, 1.0),
-                    (after, [_, end]) if after > n_all => {
-                        (n_all - 1, if end == End::Sink { -1.0 } else { 1.0 })
-                    }
+                    (after, [_, end]) if after > n_all => (n_all - 1, if end.is_odd() { -1.0 } else { 1.0 }),
                     _ => (after - 1, 1.0),
                 };
                 // Of windows that end before the domain does nothing is beyond.

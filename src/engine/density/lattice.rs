@@ -8,7 +8,7 @@
 pub const AXES: usize = 3;
 
 /// What an end of an axis is to kernels that reach over it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum End {
     /// Nothing passes: kernels are mirrored, the density has no gradient.
     #[default]
@@ -17,6 +17,16 @@ pub enum End {
     Wrap,
     /// Nothing stays: kernels are mirrored with the other sign, the density is zero.
     Sink,
+    /// The density has this value, mass per m^d: what differs from it is mirrored with the other sign.
+    Held(f64),
+}
+
+impl End {
+    /// Whether kernels are mirrored with the other sign.
+    #[inline(always)]
+    pub fn is_odd(self) -> bool {
+        matches!(self, Self::Sink | Self::Held(_))
+    }
 }
 
 /// Cells of one size.
@@ -42,10 +52,15 @@ impl Lattice {
         for (axis, &(cells, edge, ends)) in (AXES - axes.len()..).zip(axes) {
             (lattice.cells[axis], lattice.edge[axis], lattice.ends[axis]) = (cells, edge, ends);
         }
+        let is_possible = |end: &End| match end {
+            End::Held(value) => *value >= 0.0 && value.is_finite(),
+            _ => true,
+        };
         let n = lattice.cells.iter().try_fold(1_usize, |n, &own| n.checked_mul(own))?;
         let is_sound = n > 0
             && n <= u32::MAX as usize
-            && lattice.edge.iter().all(|edge| *edge > 0.0 && edge.is_finite());
+            && lattice.edge.iter().all(|edge| *edge > 0.0 && edge.is_finite())
+            && lattice.ends.as_flattened().iter().all(is_possible);
         is_sound.then_some(lattice)
     }
 

@@ -18,6 +18,8 @@ pub struct Limits {
     pub kernel: [[f64; 2]; AXES],
     /// Of kernels for curvatures.
     pub curvature: [f64; 2],
+    /// The same along each axis.
+    pub curvature_along: [[f64; 2]; AXES],
     pub support: [f64; 2],
 }
 
@@ -31,6 +33,7 @@ impl Limits {
         let mut limits = Self {
             kernel: [[0.0, f64::INFINITY]; AXES],
             curvature: [0.0, f64::INFINITY],
+            curvature_along: [[0.0, f64::INFINITY]; AXES],
             support: [0.0, f64::INFINITY],
         };
         for axis in lattice.axes() {
@@ -40,8 +43,10 @@ impl Limits {
             let high = (most / REACH).max(low);
             limits.support[0] = limits.support[0].max(low);
             limits.support[1] = limits.support[1].min(high);
-            limits.curvature[0] = limits.curvature[0].max(0.3 * edge);
-            limits.curvature[1] = limits.curvature[1].min((most / CURVATURE_REACH).max(0.3 * edge));
+            let of_curvature = [0.3 * edge, (most / CURVATURE_REACH).max(0.3 * edge)];
+            limits.curvature_along[axis] = of_curvature;
+            limits.curvature[0] = limits.curvature[0].max(of_curvature[0]);
+            limits.curvature[1] = limits.curvature[1].min(of_curvature[1]);
             limits.kernel[axis] = [low, high];
         }
         limits.support[1] = limits.support[1].max(limits.support[0]);

@@ -4,10 +4,10 @@
 //! classes, stencils and bands. It deliberately finds no kernel.
 
 use super::super::parallel::{self, Pool};
-use super::adaptive::{Cell, Estimate};
 use super::bands::smooth;
 use super::classes::{Fill, Table, bandwidth_of, class_of};
 use super::global::band;
+use super::kinds::{Cell, Estimate};
 use super::lattice::{AXES, Field, Lattice, Window};
 use super::limits::Limits;
 use super::stencil::{Gathering, Lent, scatter};

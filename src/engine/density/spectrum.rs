@@ -35,12 +35,12 @@ struct Waves {
 
 impl Waves {
     fn new(n: usize, ends: [End; 2]) -> Self {
-        let (a, e, is_sine) = match ends {
-            [End::Wrap, _] | [_, End::Wrap] => (4, 0, false),
-            [End::Mirror, End::Mirror] => (2, 0, false),
-            [End::Sink, End::Sink] => (2, 2, true),
-            [End::Mirror, End::Sink] => (2, 1, false),
-            [End::Sink, End::Mirror] => (2, 1, true),
+        let (a, e, is_sine) = match ends.map(End::is_odd) {
+            _ if ends.contains(&End::Wrap) => (4, 0, false),
+            [false, false] => (2, 0, false),
+            [true, true] => (2, 2, true),
+            [false, true] => (2, 1, false),
+            [true, false] => (2, 1, true),
         };
         Self { n, a, e, is_sine }
     }

@@ -82,15 +82,15 @@ pub fn scatter<'t>(
 }
 
 /// A part of a field.
-struct Slab<'f> {
-    first: [usize; AXES],
-    end: [usize; AXES],
-    cells: [usize; AXES],
-    values: &'f mut [f64],
+pub(super) struct Slab<'f> {
+    pub(super) first: [usize; AXES],
+    pub(super) end: [usize; AXES],
+    pub(super) cells: [usize; AXES],
+    pub(super) values: &'f mut [f64],
 }
 
 /// Cut along the first axis that has more than one cell.
-fn slabs_of(field: &mut Field) -> Vec<Slab<'_>> {
+pub(super) fn slabs_of(field: &mut Field) -> Vec<Slab<'_>> {
     let n = field.n();
     let axis = (0..AXES).find(|&axis| field.cells[axis] > 1).unwrap_or(AXES - 1);
     let per_cell: usize = field.cells[axis + 1..].iter().product();

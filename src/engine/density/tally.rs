@@ -51,19 +51,11 @@ impl Tally {
             origins.iter().zip(low).map(|(x, low)| if x.is_finite() { *x } else { *low }).collect();
         for idx in 0..n {
             let mass = masses.map_or(1.0, |masses| masses[idx]);
-            let (mut cell, mut is_inside) = (0, true);
-            for ((axis, x), low) in lattice.axes().zip(positions).zip(low) {
-                let place = (x[idx] - low) / lattice.edge[axis];
-                let n = lattice.cells[axis];
-                // What is on the upper end is inside.
-                is_inside &= place >= 0.0 && place <= n as f64;
-                cell = cell * n + (place.max(0.0) as usize).min(n - 1);
-            }
-            if !is_inside {
+            let Some(cell) = cell_of(lattice, low, positions, idx) else {
                 tally.outside.0 += 1;
                 tally.outside.1 += mass;
                 continue;
-            }
+            };
             // Squares of the masses themselves might be beyond all numbers.
             let share = if largest > 0.0 { mass / largest } else { 0.0 };
             for ((axis, x), origin) in lattice.axes().zip(positions).zip(&origins) {
@@ -84,6 +76,32 @@ impl Tally {
             tally.squares.push(sums[2]);
         }
         tally
+    }
+
+    /// Means of something of the same particles, weighted by mass, by cell with particles: components on the axes of the lattice.
+    /// Particles for which it is no number are left out; of none the mean is zero.
+    pub fn means(
+        &self,
+        lattice: &Lattice,
+        low: &[f64],
+        (positions, masses): (&[&[f64]], Option<&[f64]>),
+        values: &[&[f64]],
+    ) -> Vec<[f64; AXES]> {
+        let mut sums = vec![[0.0; AXES + 1]; self.cells.len()];
+        for idx in 0..positions.first().map_or(0, |axis| axis.len()) {
+            let cell = cell_of(lattice, low, positions, idx);
+            let at = cell.and_then(|cell| self.cells.binary_search(&(cell as u32)).ok());
+            let Some(at) = at.filter(|_| values.iter().all(|own| own[idx].is_finite())) else { continue };
+            let share = masses.map_or(1.0, |masses| masses[idx] / self.largest);
+            for (axis, own) in lattice.axes().zip(values) {
+                sums[at][axis] += share * own[idx];
+            }
+            sums[at][AXES] += share;
+        }
+        let mean = |[x, y, z, all]: [f64; AXES + 1]| {
+            if all > 0.0 { [x / all, y / all, z / all] } else { [0.0; AXES] }
+        };
+        sums.into_iter().map(mean).collect()
     }
 
     /// The same of some axes alone, the last ones then, with other lengths for one.
@@ -130,4 +148,17 @@ impl Tally {
             }
         }
     }
+}
+
+/// The cell of a particle, if it is inside.
+fn cell_of(lattice: &Lattice, low: &[f64], positions: &[&[f64]], idx: usize) -> Option<usize> {
+    let (mut cell, mut is_inside) = (0, true);
+    for ((axis, x), low) in lattice.axes().zip(positions).zip(low) {
+        let place = (x[idx] - low) / lattice.edge[axis];
+        let n = lattice.cells[axis];
+        // What is on the upper end is inside.
+        is_inside &= place >= 0.0 && place <= n as f64;
+        cell = cell * n + (place.max(0.0) as usize).min(n - 1);
+    }
+    is_inside.then_some(cell)
 }

@@ -102,7 +102,7 @@ impl Line {
     fn images(self, centre: f64, reach: f64) -> impl Iterator<Item = (f64, f64)> {
         let n = self.n as f64;
         let is_ring = self.ends.contains(&End::Wrap);
-        let [low, high]: [f64; 2] = self.ends.map(|end| if end == End::Sink { -1.0 } else { 1.0 });
+        let [low, high]: [f64; 2] = self.ends.map(|end| if end.is_odd() { -1.0 } else { 1.0 });
         // Once, or twice where the line is shorter than the reach, and so on.
         let most = ((reach + n) / (2.0 * n)) as i32 + 1;
         let own = move |k: i32| {
@@ -131,7 +131,7 @@ impl Line {
 
     /// Whether a kernel and its images are the same everywhere, to 3e-9: it is wider than twice the line, and nothing is lost.
     pub fn is_short_for(self, width: f64) -> bool {
-        width > 2.0 * self.n as f64 && !self.ends.contains(&End::Sink)
+        width > 2.0 * self.n as f64 && !self.ends.iter().any(|end| end.is_odd())
     }
 
     /// The same in every fine cell.

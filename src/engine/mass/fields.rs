@@ -3,6 +3,7 @@
 //! Owns means of cells over the bins of an output, and the rows of densities and kernels. May use kernels, grids and the plan.
 //! It deliberately keeps nothing: an output finds kernels of its own.
 
+use super::super::density::Cell;
 use super::super::error::RunError;
 use super::super::snapshot::Row;
 use super::flock::Flock;
@@ -22,7 +23,7 @@ impl<const D: usize> Scene<'_, D> {
     }
 
     fn find(&self, population: usize) -> Result<(Finder, Found), RunError> {
-        let finder = Finder::new(self.site, population, self.width)?;
+        let finder = Finder::new(self.site, population, self.width)?.along_flow(self.site, self.t);
         let flocks: Vec<&Flock<D>> =
             self.flocks.iter().filter(|flock| flock.population == population).collect();
         let found = finder.find(&flocks, self.units.row(population), None)?;
@@ -77,7 +78,8 @@ impl<const D: usize> Scene<'_, D> {
             for (rank, axis) in self.site.plan.axes.iter().enumerate() {
                 numbers[3 + axis.index] = centre[rank];
                 let own = here.and_then(|(idx, _)| found.cells.get(idx));
-                let h = own.map_or(found.one[first + rank], |own| own.h * own.s[first + rank]);
+                let along = |own: &Cell| own.matrix()[first + rank][first + rank].sqrt();
+                let h = own.map_or(found.one[first + rank], along);
                 numbers[6 + axis.index] = if h > 0.0 { h } else { f64::NAN };
             }
             if let Some((idx, (_, count))) = here {

@@ -4,7 +4,8 @@
 //! nothing.
 
 use super::super::density::{
-    Adaptive, Cell, End, Global, Lattice, Projection, Shape, Tally, Variant, estimate, global, histogram,
+    Adaptive, Cell, End, Global, Lattice, Orientation, Projection, Shape, Tally, Variant, estimate, global,
+    histogram,
 };
 use super::super::density::{Rule as DensityRule, Weighing as DensityWeighing};
 use super::super::error::RunError;
@@ -26,6 +27,8 @@ pub struct Finder {
     low: Vec<f64>,
     kernels: Kernels,
     width: Width,
+    /// Of the flow, by cell of the lattice, if kernels follow it.
+    directions: Option<Vec<[f64; 3]>>,
 }
 
 /// Kernels, and the density that they give.
@@ -51,7 +54,26 @@ impl Finder {
         };
         let axes: Vec<(usize, f64, [End; 2])> = (0..D).map(axis).collect();
         let lattice = Lattice::new(&axes).ok_or_else(|| unsound("cells of kernels that are none"))?;
-        Ok(Self { lattice, low: site.low.to_vec(), kernels, width })
+        Ok(Self { lattice, low: site.low.to_vec(), kernels, width, directions: None })
+    }
+
+    /// The same with kernels along the flow of a time, where the plan says so.
+    pub fn along_flow<const D: usize>(mut self, site: &Site<D>, t: f64) -> Self {
+        if self.kernels.is_oriented && D > 1 {
+            let (first, flows) = (self.lattice.axes().start, site.transport.flows());
+            let direction = |cell: usize| {
+                let at = self.lattice.cell(cell);
+                let place: [f64; D] = std::array::from_fn(|axis| {
+                    site.low[axis] + (at[first + axis] as f64 + 0.5) * self.lattice.edge[first + axis]
+                });
+                let own = site.velocity(&flows, &place, t);
+                let mut all = [0.0; 3];
+                all[first..].copy_from_slice(&own);
+                all
+            };
+            self.directions = Some((0..self.lattice.n_cells()).map(direction).collect());
+        }
+        self
     }
 
     /// Kernels of particles where they are.
@@ -88,6 +110,7 @@ impl Finder {
         let adaptive = Adaptive {
             variant: Variant::Corrected,
             shape: shape(kernels),
+            orientation: self.orientation(&tally),
             start: start.map_or_else(Default::default, super::super::density::Start::Bandwidth),
             weighing: weighing(kernels.weighing),
             bounds: kernels.bandwidth,
@@ -101,6 +124,14 @@ impl Finder {
         let n_loops = found.history.len().saturating_sub(1);
         let (density, standard_error, cells) = (found.density, found.standard_error, found.cells);
         Found { projection, density, standard_error, tally, cells, one: [0.0; 3], n_loops }
+    }
+
+    /// Directions of cells with particles, in the order of the tally.
+    fn orientation(&self, tally: &Tally) -> Orientation {
+        match &self.directions {
+            None => Orientation::Axes,
+            Some(all) => Orientation::Each(tally.cells.iter().map(|&cell| all[cell as usize]).collect()),
+        }
     }
 
     /// How much narrower kernels are that react than those that densities are shown by.

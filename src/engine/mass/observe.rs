@@ -30,6 +30,8 @@ pub struct Scene<'a, const D: usize> {
     pub quanta: Quanta,
     pub book: &'a Book,
     pub width: Width,
+    /// s
+    pub t: f64,
     /// What reactions have made and no particle carries yet, by population.
     pub pending: &'a [f64],
 }

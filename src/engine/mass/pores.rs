@@ -25,17 +25,40 @@ impl<const D: usize> Site<'_, D> {
         !is_constant && self.pores().is_none()
     }
 
+    /// Which way the water goes at a place, and how fast: of cells the mean discharge of their faces, m/s;
+    /// `flows` are all of the plan.
+    pub fn velocity(&self, flows: &[Flow], place: &[f64; D], t: f64) -> [f64; D] {
+        let period = self.period_at(t);
+        if let Some(flow) = self.face_flow(period) {
+            let cell = flow.cells.place(self.cell_at(flow, place));
+            return std::array::from_fn(|axis| {
+                let index = self.plan.axes[axis].index;
+                let (low, high) = flow.cells.faces(index, cell);
+                0.5 * (flow.flux[index][low] + flow.flux[index][high])
+            });
+        }
+        match flows.get(period) {
+            Some(Flow::Uniform(velocity)) => std::array::from_fn(|axis| velocity[axis]),
+            Some(Flow::Expression(tapes)) => {
+                std::array::from_fn(|axis| self.evaluate(&tapes[axis], &[*place], t)[0])
+            }
+            _ => [0.0; D],
+        }
+    }
+
+    fn cell_at(&self, flow: &FaceFlow, at: &[f64; D]) -> usize {
+        let mut place = [0; 3];
+        for (axis, &x) in at.iter().enumerate() {
+            let index = self.plan.axes[axis].index;
+            let edges = &flow.cells.edges()[index];
+            place[index] = edges.partition_point(|&edge| edge <= x).clamp(1, edges.len() - 1) - 1;
+        }
+        flow.cells.cell(place)
+    }
+
     pub fn porosity(&self, places: &[[f64; D]]) -> Vec<f64> {
         let Some(flow) = self.pores() else { return self.evaluate(&self.transport.porosity, places, 0.0) };
-        let of_place = |at: &[f64; D]| {
-            let mut place = [0; 3];
-            for (axis, &x) in at.iter().enumerate() {
-                let index = self.plan.axes[axis].index;
-                let edges = &flow.cells.edges()[index];
-                place[index] = edges.partition_point(|&edge| edge <= x).clamp(1, edges.len() - 1) - 1;
-            }
-            flow.porosity[flow.cells.cell(place)]
-        };
+        let of_place = |at: &[f64; D]| flow.porosity[self.cell_at(flow, at)];
         places.iter().map(of_place).collect()
     }
 

@@ -255,7 +255,7 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
         reactions.react(self.site, &variances, stock, (Turn { turn, step }, span.0, span.1))
     }
 
-    fn scene(&self) -> Scene<'_, D> {
+    fn scene(&self, t: f64) -> Scene<'_, D> {
         let (mut heaviest, mut quanta) = (self.units.largest(), self.quanta);
         let mut pending: &[f64] = &[];
         if let Some(reactions) = &self.reactions {
@@ -265,7 +265,7 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
         }
         let (site, flocks, units, book) = (self.site, &self.flocks[..], &self.units, &self.book);
         let width = self.tracker.width;
-        Scene { site, flocks, units, heaviest, quanta, book, width, pending }
+        Scene { site, flocks, units, heaviest, quanta, book, width, t, pending }
     }
 
     /// The outputs of a time; between two steps those of a copy that goes a part of the next one.
@@ -306,13 +306,13 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
     }
 
     fn look(&self, due: &Due) -> Result<Vec<Snapshot>, RunError> {
-        let scene = self.scene();
+        let scene = self.scene(due.t);
         due.outputs.iter().map(|&output_idx| scene.observe(output_idx, due.t)).collect()
     }
 
     /// Per population |inside + left − entered| / entered, with what reactions take and make.
     fn defects(&self) -> Vec<f64> {
-        let scene = self.scene();
+        let scene = self.scene(self.site.plan.time.duration);
         let defect = |population: usize| {
             let (entered, left) = self.book.whole(population);
             let made = self.book.net(population);

@@ -2,6 +2,8 @@
 //!
 //! Owns concentrations in cells and what becomes of them. May use `chemistry` and the plan. It deliberately knows no particle.
 
+#![allow(clippy::needless_range_loop)] // A cell belongs to several columns at once.
+
 use super::super::super::error::RunError;
 use super::super::super::parallel::{self, Pool};
 use super::super::super::program::unsound;

@@ -3,6 +3,8 @@
 //! Owns these lists of one population. May use flocks and `parallel`. It deliberately adds masses in the order of particles:
 //! no number of threads shows.
 
+#![allow(clippy::needless_range_loop)] // An axis belongs to several arrays at once.
+
 use super::super::super::density::Lattice;
 use super::super::super::parallel;
 use super::super::flock::Flock;

@@ -186,10 +186,10 @@ impl<const D: usize> Reactions<D> {
         let mut fields = Fields { content: self.content(&spread), spread };
         let before = fields.content.columns.clone();
         self.vessel.react(site.plan, &mut fields.content, (when.step + 1, t, dt))?;
-        for idx in 0..self.populations.len() {
+        for (idx, census) in census.iter().enumerate() {
             let changes = self.changes(idx, &fields, &before);
             let Some((loss, gains)) = changes else { continue };
-            self.settle(idx, &census[idx], (loss, gains), (flocks, book), when.turn)?;
+            self.settle(idx, census, (loss, gains), (flocks, book), when.turn)?;
         }
         Ok(())
     }

@@ -2,6 +2,8 @@
 //!
 //! Owns the cells of the search. May use the lattice's ends. It deliberately decides nothing: it lists.
 
+#![allow(clippy::needless_range_loop)] // An axis belongs to several arrays at once.
+
 use super::super::super::density::End;
 
 /// A particle on its way through a step's meetings.

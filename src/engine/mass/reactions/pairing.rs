@@ -2,6 +2,8 @@
 //!
 //! Owns the way from flocks to crowds and back. May use the folder. It deliberately knows no chance: `pairs` does.
 
+#![allow(clippy::needless_range_loop)] // An axis belongs to several arrays at once.
+
 use super::super::super::density::End;
 use super::super::super::error::RunError;
 use super::super::flock::Flock;

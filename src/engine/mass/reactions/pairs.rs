@@ -156,6 +156,9 @@ pub fn density<const D: usize>(ways: [[Option<f64>; 3]; D], variances: [f64; D])
     product
 }
 
+/// Population, place and mass of a particle that is made.
+pub type Product<const D: usize> = (usize, [f64; D], f64);
+
 /// What one reaction makes and takes, by population.
 pub struct Exchanged {
     pub made: Vec<f64>,
@@ -168,7 +171,7 @@ pub fn meet<const D: usize>(
     (idx, meeting): (u64, &Meeting),
     crowds: &mut [Crowd<D>],
     exchanged: &mut Exchanged,
-) -> Vec<(usize, [f64; D], f64)> {
+) -> Vec<Product<D>> {
     let Some(kinetics) = step.plan.chemistry.as_ref().and_then(|it| it.kinetics.as_ref()) else {
         return Vec::new();
     };
@@ -317,7 +320,7 @@ impl<const D: usize> Tools<'_, D> {
         (outer, p): (usize, usize),
         partner: Option<(usize, usize)>,
         crowds: &mut [Crowd<D>],
-        (exchanged, products): (&mut Exchanged, &mut Vec<(usize, [f64; D], f64)>),
+        (exchanged, products): (&mut Exchanged, &mut Vec<Product<D>>),
     ) {
         let own = crowds[outer].members[p].clone();
         let own_share = self.share(crowds[outer].species);
@@ -372,11 +375,7 @@ fn middle<const D: usize>(own: &Member<D>, other: &Member<D>, distance: [f64; D]
 }
 
 /// Puts what was made into flocks.
-pub fn place<const D: usize>(
-    products: Vec<(usize, [f64; D], f64)>,
-    makers: &mut [Maker],
-    flocks: &mut Vec<Flock<D>>,
-) {
+pub fn place<const D: usize>(products: Vec<Product<D>>, makers: &mut [Maker], flocks: &mut Vec<Flock<D>>) {
     for (population, at, mass) in products {
         let maker = &mut makers[population];
         let id = flock::id(maker.origin, maker.n_made);
