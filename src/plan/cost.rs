@@ -155,8 +155,9 @@ pub fn estimate(plan: &Plan, scales: Option<&TimeScales>) -> Cost {
         + (table::OBSERVE_BIN + table::WRITE_ROW) * n_binned;
     let n_bins: f64 = plan.axes.iter().map(|axis| axis.bins as f64).product();
     Cost {
-        state_bytes: (8.0 * n_particles * (n_axes + n_values + own_values(plan, n_values)) + pair_bytes(plan))
-            as u64,
+        state_bytes: (8.0 * n_particles * (n_axes + n_values + own_values(plan, n_values))
+            + pair_bytes(plan)
+            + lattice_bytes(plan)) as u64,
         bin_bytes: (8.0 * n_bins * (1.0 + n_values) * 2.0) as u64,
         output_bytes: output_bytes(plan),
         particle_steps,
@@ -180,6 +181,15 @@ fn estimate_cost(plan: &Plan) -> f64 {
         _ => 2.0 * table::KERNEL_CELL * table::KERNEL_LENGTH * f64::from(d),
     };
     n_populations * n_cells * per_cell / plan.particles.count as f64 + table::AVERAGE
+}
+
+/// Bytes of the cells that kernels give to: content of each species before and after, what is lost, where all are; and the fields
+/// that a search for kernels goes through.
+fn lattice_bytes(plan: &Plan) -> f64 {
+    let Some(kernels) = &plan.kernels else { return 0.0 };
+    let n_species = plan.species.len() as f64;
+    let d = plan.axes.len() as f64;
+    8.0 * kernels.n_cells() as f64 * (4.0 * n_species + d + 8.0 + d * (d + 1.0))
 }
 
 /// Numbers per particle beside its position and what it carries: of parcels that come and go, and of those that are

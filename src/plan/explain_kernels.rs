@@ -25,6 +25,11 @@ pub(super) fn lines(plan: &Plan) -> Vec<String> {
             number(kernels.tolerance)
         ));
     }
+    if kernels.is_oriented {
+        lines.push(
+            "densities that are shown: kernels along the flow; those that react lie along the axes".into(),
+        );
+    }
     match kernels.reacting {
         None => {}
         Some(Reacting::Masses) => {
@@ -33,7 +38,7 @@ pub(super) fn lines(plan: &Plan) -> Vec<String> {
             );
             if kernels.searches() {
                 lines.push(format!(
-                    "kernels that react are {} as wide, or hold eight particles; found again after {} steps, or when the number of particles has changed by 5 %",
+                    "kernels that react are {} as wide, or hold four particles; found again after {} steps, or when the number of particles has changed by 5 %",
                     number(kernels.narrowing),
                     kernels.refresh
                 ));

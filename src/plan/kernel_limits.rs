@@ -4,10 +4,10 @@
 //! particles.
 
 use super::Plan;
-use super::kernels::Reacting;
+use super::kernels::{Manner, Reacting};
 use super::limits::{Limit, round_down, short};
 use super::start_rates::start_rates;
-use crate::diagnostic::codes::{M038, N208};
+use crate::diagnostic::codes::{M038, N207, N208};
 use crate::diagnostic::{Diagnostic, precise};
 use crate::scenario::{Rate, Reaction, Scenario};
 
@@ -51,6 +51,7 @@ pub(super) fn check(
     limits: &mut Vec<Limit>,
     diagnostics: &mut Vec<Diagnostic>,
 ) {
+    diagnostics.extend(too_fine(scenario, plan));
     let Some(reacting) = plan.reacting() else { return };
     let Some(rates) = start_rates(plan) else { return };
     let most = rates.losses.iter().copied().fold(0.0, f64::max);
@@ -93,6 +94,37 @@ pub(super) fn check(
         message = message.also(reaction.span, "the fastest reaction");
     }
     diagnostics.push(message);
+}
+
+/// A kernel of a given size that the cells or the domain cannot hold.
+fn too_fine(scenario: &Scenario, plan: &Plan) -> Option<Diagnostic> {
+    let kernels = plan.kernels.as_ref().filter(|kernels| kernels.manner == Manner::Fixed)?;
+    let [h, _] = kernels.bandwidth?;
+    let place = scenario.estimation.as_ref()?.bandwidth.as_ref()?.span;
+    let edges: Vec<f64> = (plan.axes.iter().zip(&kernels.cells))
+        .filter(|(_, n)| **n > 1)
+        .map(|(axis, &n)| (axis.high - axis.low) / n as f64)
+        .collect();
+    let widest = edges.iter().copied().fold(0.0, f64::max);
+    let extents = plan.axes.iter().zip(&kernels.cells).filter(|(_, n)| **n > 1);
+    let most = extents.map(|(axis, &n)| (axis.high - axis.low) * (0.9 - 1.0 / n as f64) / 3.0);
+    let most = most.fold(f64::INFINITY, f64::min);
+    let least = 0.4 * widest;
+    let slack = 1.0 + 1e-9;
+    if h * slack >= least && h <= most * slack {
+        return None;
+    }
+    let help = match h < least {
+        true => format!("use `grid {} m` or less, or a larger bandwidth", short(2.5 * h)),
+        false => "use a smaller bandwidth: a kernel should end within the domain".to_owned(),
+    };
+    Some(
+        Diagnostic::refused(N207, "the cells or the domain cannot hold a kernel of this size")
+            .at(place, format!("{} m", short(h)))
+            .found(format!("{} m", short(h)))
+            .expected(format!("from {} to {} m", short(least), short(most)))
+            .help(help),
+    )
 }
 
 /// Three figures.

@@ -4,9 +4,9 @@
 //! deliberately finds no bandwidth: that hangs on particles.
 
 use super::build_tape::SPECIES_INPUT;
-use super::chemistry::{Chemistry, Kinetic, Kinetics};
+use super::chemistry::{Chemistry, Kinetic, Kinetics, Law};
 use super::tape::dual::differentiate;
-use super::tape::{Operation, Register};
+use super::tape::{Binary, Operation, Register};
 use super::transport::Transport;
 use super::{Axis, InstantReaction, Output, Plan, Quantity, shares};
 use crate::scenario::estimation::Estimation;
@@ -134,6 +134,43 @@ pub(super) fn shown(plan: &Plan) -> Option<Output> {
     })
 }
 
+/// What cells hold of a species is what is dissolved and what is sorbed; rates hang on the former.
+///
+/// - Equation: `R dc/dt = ν r(c)`, so `u = R c` changes by `ν r(u/R)`; by `ν R r` where single particles turn at a rate of first
+///   order, which they do whether they are sorbed or not.
+/// - Symbols: `R` retardation, `c` concentration in the water, `u` of both per volume of water.
+/// - Range: linear sorption.
+/// - Source: methods, (0.1), section 1.7.
+/// - Shape: all components of a plan.
+pub(super) fn retard(plan: &mut Plan) {
+    let Some(transport) = &plan.transport else { return };
+    let retardations: Vec<(usize, f64)> = (transport.populations.iter())
+        .filter(|population| population.retardation != 1.0)
+        .map(|population| (population.species, population.retardation))
+        .collect();
+    for (species, retardation) in retardations {
+        let Some((component, share)) = plan.species[species].terms.first_mut() else { continue };
+        *share = 1.0 / retardation;
+        let component = *component;
+        plan.components[component].initial.scale(retardation);
+        let kinetics = plan.chemistry.as_mut().and_then(|chemistry| chemistry.kinetics.as_mut());
+        let Some(Kinetics { reactions, laws, .. }) = kinetics else { continue };
+        for (reaction, rate) in reactions.iter_mut().zip(&mut laws.rates) {
+            let mut taken = reaction.changes.iter().filter(|(_, change)| *change < 0.0);
+            let is_alone = taken.next().is_some_and(|(own, _)| *own == component) && taken.next().is_none();
+            let Law::MassAction { constant, orders } = &mut reaction.law else { continue };
+            if !is_alone || orders[..] != [(species, 1.0)] {
+                continue;
+            }
+            *constant *= retardation;
+            let first = laws.operations.len() as Register;
+            laws.operations.push(Operation::Constant(retardation));
+            laws.operations.push(Operation::Binary(Binary::Multiply, *rate, first));
+            *rate = first + 1;
+        }
+    }
+}
+
 /// Equal edges, as nearly as whole numbers allow.
 fn usual_cells(axes: &[Axis]) -> Vec<usize> {
     let extents: Vec<f64> = axes.iter().map(|axis| axis.high - axis.low).collect();
@@ -161,10 +198,9 @@ fn weigh_products(
     let whole: f64 = masses.iter().sum();
     let n: f64 = transport.populations.iter().map(|it| it.count as f64).sum();
     for (idx, population) in transport.populations.iter_mut().enumerate() {
-        if masses[idx] > 0.0 || potential[idx].is_nan() || potential[idx] <= 0.0 {
-            continue;
-        }
+        let is_made = potential[idx] > 1.001 * masses[idx];
         let own = match &scenario.particles.shares {
+            _ if !is_made => continue,
             Some(Shares::ByMass) if whole > 0.0 => whole / n,
             _ => potential[idx] / population.count as f64,
         };
@@ -209,6 +245,11 @@ impl Plan {
     /// How particles that carry mass react by kernels, if they do.
     pub fn reacting(&self) -> Option<Reacting> {
         self.kernels.as_ref().and_then(|kernels| kernels.reacting)
+    }
+
+    /// The species that a component is.
+    pub fn species_of(&self, component: usize) -> Option<usize> {
+        self.species.iter().position(|species| matches!(species.terms[..], [(own, _)] if own == component))
     }
 
     /// Whether reactions change a species, or their rates hang on it.

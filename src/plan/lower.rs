@@ -129,6 +129,8 @@ fn only_masses(plan: &mut Plan) {
         plan.components.clear();
         plan.species.iter_mut().for_each(|species| species.terms.clear());
         plan.chemistry = None;
+    } else {
+        kernels::retard(plan);
     }
     only_tracks(plan);
     let decays = plan.transport.as_ref().is_some_and(|transport| transport.decay.is_some());

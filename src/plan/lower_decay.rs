@@ -103,7 +103,7 @@ fn refusal(scenario: &Scenario, reaction: &Reaction) -> Diagnostic {
         .found("a reaction in equilibrium")
         .expected("reactions at rates, or instant ones")
         .help(
-            "use `particles fluid`, whose parcels carry totals, or give the reaction two rates: `<-> … @ forward, backward`",
+            "use `particles fluid`, whose parcels carry totals, or give the reaction two rates: `<-> … @ forward kf, backward kb`",
         )
 }
 

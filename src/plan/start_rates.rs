@@ -18,8 +18,8 @@ use super::transport::{Region, SideRule, Strength};
 pub(super) fn start_rates(plan: &Plan) -> Option<AtStart> {
     let brought: Vec<f64> = (0..plan.species.len()).map(|species| brought(plan, species)).collect();
     let of_component = |component: usize| {
-        let own = plan.species.iter().position(|species| species.terms == [(component, 1.0)]);
-        own.map_or(0.0, |species| brought[species])
+        let own = plan.species_of(component);
+        own.map_or(0.0, |species| brought[species] / plan.species[species].terms[0].1)
     };
     let most: Vec<f64> = (0..plan.components.len()).map(of_component).collect();
     time_scales::at_start(plan, &most)

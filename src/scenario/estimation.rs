@@ -174,7 +174,7 @@ impl Estimation {
             tolerance: 0.02,
             loops: 20,
             refresh: 20,
-            narrowing: 0.125,
+            narrowing: 0.08,
             reacting: None,
         }
     }

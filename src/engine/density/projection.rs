@@ -119,6 +119,27 @@ impl Projection {
         }
     }
 
+    /// About the variance of what cells have of particles whose squared masses are summed in some cells.
+    ///
+    /// - Equation: `Σ_b (Σ m²)_b W_b²(z) ≈ Σ_b (Σ m²)_b W_b(z) Π_i min(1, 1/(2√π ĥ_i))`.
+    /// - Symbols: `ĥ` bandwidths in cells; the sum over z of a squared kernel is the product.
+    /// - Range: where kernels and squares change little within a kernel.
+    /// - Source: `∫ W² = (2√π h)^{−d}` of a Gaussian.
+    /// - Shape: one value per cell of the lattice.
+    pub fn spread_squares(&self, cells: &[u32], squares: &[f64]) -> Vec<f64> {
+        let part = |cell: u32| -> f64 {
+            let h = self.bandwidths(cell as usize);
+            let of_axis = |axis: usize| match h[axis] / self.lattice.edge[axis] {
+                own if own > 0.0 => (0.5 / (std::f64::consts::PI.sqrt() * own)).min(1.0),
+                _ => 1.0,
+            };
+            self.lattice.axes().map(of_axis).product()
+        };
+        let weighed: Vec<f64> =
+            cells.iter().zip(squares).map(|(&cell, square)| square * part(cell)).collect();
+        self.spread(cells, &weighed)
+    }
+
     /// What the kernels of some cells find of a field.
     ///
     /// - Equation: `L_b = Σ_z W_b(z) f(z)`.

@@ -18,7 +18,7 @@ use crate::plan::kernels::{Kernels, Manner, Rule, Weighing};
 use crate::plan::transport::SideRule;
 
 /// Particles that a kernel should hold which reacts.
-const FEWEST: f64 = 8.0;
+const FEWEST: f64 = 4.0;
 
 /// Where and how kernels of one population are found.
 #[derive(Debug, Clone)]

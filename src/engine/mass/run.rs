@@ -148,10 +148,11 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
         let chain =
             site.transport.decay.as_ref().map(|decay| Chain::new(decay, &site.carriers(), site.plan.seed));
         let mut releases = drafts.releases(site)?;
+        // Its particles come from somewhere, too: before anybody counts origins.
+        let reactions = Reactions::new(site, &mut releases, width)?;
         let n_populations = site.transport.populations.len();
         let units = Units::new(&releases, n_populations, site.transport.decay.as_ref());
         let doors = releases.iter().map(|release| release.door).collect();
-        let reactions = Reactions::new(site, &mut releases, width)?;
         let n_doors = 1 + site.transport.sources.len() + 2 * D + site.transport.outlets().len();
         let ways = chain.as_ref().map_or_else(Vec::new, Chain::ways);
         let mut book = Book::new(units.clone(), doors, n_doors, n_populations, ways);

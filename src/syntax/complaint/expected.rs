@@ -81,11 +81,7 @@ pub fn literal(rule: Rule) -> Option<&'static str> {
 pub fn expected_words(rule: Rule) -> Vec<String> {
     use Rule as R;
     let one = |word: &str| vec![word.to_owned()];
-    let is_of_darcy = matches!(
-        rule,
-        R::head | R::flux | R::no_flow | R::periodic | R::conductivity | R::anisotropy | R::well | R::cells
-    );
-    if is_of_darcy {
+    if is_of_darcy(rule) {
         return one("an entry such as `head left 1 m`");
     }
     match rule {
@@ -148,4 +144,12 @@ pub fn expected_words(rule: Rule) -> Vec<String> {
         R::kw_t => one("`t`"),
         _ => literal(rule).map(|word| format!("`{word}`")).into_iter().collect(),
     }
+}
+
+fn is_of_darcy(rule: Rule) -> bool {
+    use Rule as R;
+    matches!(
+        rule,
+        R::head | R::flux | R::no_flow | R::periodic | R::conductivity | R::anisotropy | R::well | R::cells
+    )
 }

@@ -8,8 +8,10 @@ use super::super::super::error::RunError;
 use super::super::super::parallel::{self, Pool};
 use super::super::super::program::unsound;
 use super::super::super::reactions::explain;
+use super::noise::Noise;
 use crate::chemistry::{Batch, Failure, Reactor, Scratch, Work};
 use crate::diagnostic::precise;
+use crate::plan::chemistry::Kinetic;
 use crate::plan::{InstantReaction, Plan};
 use crate::state::particles::CHUNK;
 
@@ -18,6 +20,9 @@ use crate::state::particles::CHUNK;
 pub struct Vessel {
     reactor: Option<Reactor>,
     instant: Vec<InstantReaction>,
+    pub noise: Option<Noise>,
+    /// Whether something is made where there is nothing.
+    pub makes_of_nothing: bool,
     /// The species of each component.
     species: Vec<usize>,
     n_species: usize,
@@ -31,6 +36,8 @@ pub struct Content {
     /// Centres along x, y and z; empty along axes that there are not.
     pub places: [Vec<f64>; 3],
     pub columns: Vec<Vec<f64>>,
+    /// Squared standard errors of the same; empty where nobody asks.
+    pub variances: Vec<Vec<f64>>,
 }
 
 impl Vessel {
@@ -40,12 +47,17 @@ impl Vessel {
             false => None,
         };
         let of_component = |component: usize| {
-            let is_own = |species: &crate::plan::Species| species.terms == [(component, 1.0)];
-            plan.species.iter().position(is_own).ok_or_else(|| unsound("a component that is no species"))
+            plan.species_of(component).ok_or_else(|| unsound("a component that is no species"))
         };
+        let kinetics = plan.chemistry.as_ref().and_then(|chemistry| chemistry.kinetics.as_ref());
         Ok(Self {
             reactor,
             instant: plan.reactions.clone(),
+            noise: Noise::new(plan),
+            makes_of_nothing: kinetics.is_some_and(|kinetics| {
+                let takes = |it: &Kinetic| it.changes.iter().any(|(_, change)| *change < 0.0);
+                !kinetics.reactions.iter().all(takes)
+            }),
             species: (0..plan.components.len()).map(of_component).collect::<Result<_, _>>()?,
             n_species: plan.species.len(),
             memory: vec![0.0; n_cells],
@@ -60,6 +72,12 @@ impl Vessel {
         (step, t, dt): (u64, f64, f64),
     ) -> Result<(), RunError> {
         debug_assert_eq!(content.columns.len(), self.n_species);
+        let noise = self.noise.as_ref().filter(|_| !content.variances.is_empty());
+        let factors = noise.map(|noise| {
+            let factors =
+                noise.factors((&content.places, t + 0.5 * dt), &content.columns, &content.variances);
+            (factors, content.columns.clone())
+        });
         if let Some(reactor) = &self.reactor {
             let mut chunks = chunks(content, &self.species, &self.memory);
             let scratches: Pool<Scratch> = Pool::new();
@@ -79,6 +97,9 @@ impl Vessel {
             if let Some((idx, failure)) = failed {
                 return Err(refuse(plan, content, (step, idx * CHUNK + failure.particle), failure));
             }
+        }
+        if let Some((factors, before)) = &factors {
+            correct(&mut content.columns, before, factors);
         }
         for reaction in &self.instant {
             complete(reaction, &mut content.columns);
@@ -139,6 +160,26 @@ fn refuse(plan: &Plan, content: &Content, (step, at): (u64, usize), failure: Fai
     let what = format!("in the cell at ({}): {}", place.join(", "), explain(plan, failure.why));
     let particle = content.cells.get(at).copied().map_or(0, u64::from);
     RunError::Chemistry { step, particle, what, why: failure.why }
+}
+
+/// Multiplies what has reacted, as far as there is enough for more of it.
+fn correct(columns: &mut [Vec<f64>], before: &[Vec<f64>], factors: &[f64]) {
+    for (cell, &wanted) in factors.iter().enumerate() {
+        let mut factor = wanted;
+        for (new, old) in columns.iter().zip(before) {
+            let (new, old) = (new[cell], old[cell]);
+            if new < old {
+                factor = factor.min(old / (old - new));
+            }
+        }
+        for (new, old) in columns.iter_mut().zip(before) {
+            let changed = old[cell] + factor * (new[cell] - old[cell]);
+            // What does not change keeps its last digit.
+            if factor != 1.0 && new[cell] != old[cell] {
+                new[cell] = changed.max(0.0);
+            }
+        }
+    }
 }
 
 /// `ξ = min_r c_r/ν_r`, taken of reactants and given to products.

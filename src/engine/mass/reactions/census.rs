@@ -20,6 +20,8 @@ pub struct Census {
     /// Cells with particles, rising, and the mass in each.
     pub cells: Vec<u32>,
     pub masses: Vec<f64>,
+    /// Sums of squared masses of the same cells, if they are asked for.
+    pub squares: Vec<f64>,
     /// Σm and Σm².
     pub moments: [f64; 2],
 }
@@ -29,7 +31,7 @@ impl Census {
     pub fn of<const D: usize>(
         flocks: &[&Flock<D>],
         (lattice, low): (&Lattice, &[f64; D]),
-        of_cell: &mut [f64],
+        (of_cell, has_squares): (&mut [f64], bool),
     ) -> Self {
         let places = parallel::map(flocks.len(), &|idx| locate(flocks[idx], lattice, low));
         let mut census = Self { places, ..Self::default() };
@@ -46,7 +48,18 @@ impl Census {
             census.cells.push(cell as u32);
             census.masses.push(std::mem::take(mass));
         }
+        if has_squares {
+            census.square(flocks, of_cell);
+        }
         census
+    }
+
+    fn square<const D: usize>(&mut self, flocks: &[&Flock<D>], of_cell: &mut [f64]) {
+        for (flock, places) in flocks.iter().zip(&self.places) {
+            let inside = places.iter().zip(&flock.masses).filter(|(cell, _)| **cell != OUTSIDE);
+            inside.for_each(|(&cell, &mass)| of_cell[cell as usize] += mass * mass);
+        }
+        self.squares = self.cells.iter().map(|&cell| std::mem::take(&mut of_cell[cell as usize])).collect();
     }
 
     /// Effective number of particles.

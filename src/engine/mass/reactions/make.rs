@@ -47,10 +47,11 @@ impl Maker {
         flocks: &mut Vec<Flock<D>>,
     ) {
         let whole: f64 = gains.masses.iter().sum();
-        if !(whole > 0.0 && self.unit > 0.0) {
+        if whole.is_nan() || whole <= 0.0 {
             return;
         }
-        let unit = self.unit.max(inside / (MOST_OF_COUNT * self.count));
+        let all = inside + self.pending + whole;
+        let unit = self.unit.max(all / (MOST_OF_COUNT * self.count));
         let n = ((self.pending + whole) / unit).floor();
         let first = unit - self.pending.min(unit);
         self.pending += whole - n * unit;

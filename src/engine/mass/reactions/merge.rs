@@ -44,23 +44,20 @@ pub fn merge<const D: usize>(
     }
     light.sort_unstable();
     for of_cell in light.chunk_by(|one, other| one.0 == other.0) {
-        let Some((&(_, mut own, mut idx), others)) = of_cell.split_first() else { continue };
-        for &(_, other, at) in others {
+        // One that others join until it is heavy enough.
+        let mut open: Option<(usize, usize)> = None;
+        for &(_, other, at) in of_cell {
+            let Some((own, idx)) = open else {
+                open = Some((other, at));
+                continue;
+            };
             is_changed = true;
             let (mass, more) = (flocks[own].masses[idx], flocks[other].masses[at]);
-            let id = flocks[own].ids[idx];
-            let stays = stream.uniforms_of(id, 2 + turn)[0] * (mass + more) < mass;
+            let stays = stream.uniforms_of(flocks[own].ids[idx], 2 + turn)[0] * (mass + more) < mass;
             let (to, from) = if stays { ((own, idx), (other, at)) } else { ((other, at), (own, idx)) };
             flocks[from.0].masses[from.1] = 0.0;
             flocks[to.0].masses[to.1] = mass + more;
-            (own, idx) = to;
-            if mass + more >= LIGHT * unit {
-                // Heavy enough: the next pair begins with the next one.
-                (own, idx) = (usize::MAX, 0);
-            }
-            if own == usize::MAX {
-                break;
-            }
+            open = Some(to).filter(|_| mass + more < LIGHT * unit);
         }
     }
     if is_changed {

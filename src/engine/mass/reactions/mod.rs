@@ -11,6 +11,7 @@ mod census;
 mod make;
 mod merge;
 mod near;
+mod noise;
 mod pairing;
 mod pairs;
 
@@ -183,7 +184,7 @@ impl<const D: usize> Reactions<D> {
         }
         let census = self.count(flocks);
         let spread = self.spread(flocks, units, &census, when.step)?;
-        let mut fields = Fields { content: self.content(&spread), spread };
+        let mut fields = Fields { content: self.content(&spread, &census), spread };
         let before = fields.content.columns.clone();
         self.vessel.react(site.plan, &mut fields.content, (when.step + 1, t, dt))?;
         for (idx, census) in census.iter().enumerate() {
@@ -195,10 +196,11 @@ impl<const D: usize> Reactions<D> {
     }
 
     fn count(&mut self, flocks: &[Flock<D>]) -> Vec<Census> {
+        let has_squares = self.vessel.noise.is_some() && self.meetings.is_none();
         let mut all = Vec::with_capacity(self.populations.len());
         for (idx, own) in self.populations.iter().enumerate() {
             let flocks: Vec<&Flock<D>> = if own.takes_part { of(flocks, idx).collect() } else { Vec::new() };
-            all.push(Census::of(&flocks, (&own.finder.lattice, &self.low), &mut self.of_cell));
+            all.push(Census::of(&flocks, (&own.finder.lattice, &self.low), (&mut self.of_cell, has_squares)));
         }
         all
     }
@@ -238,11 +240,11 @@ impl<const D: usize> Reactions<D> {
         Ok(all)
     }
 
-    /// Concentrations where there is anything.
-    fn content(&self, spread: &[Vec<f64>]) -> Content {
+    /// What the water holds, dissolved and sorbed, where there is anything.
+    fn content(&self, spread: &[Vec<f64>], census: &[Census]) -> Content {
         let is_there = |cell: usize| spread.iter().any(|own| own.get(cell).is_some_and(|m| *m > 0.0));
-        let cells: Vec<u32> =
-            (0..self.water.len()).filter(|&cell| is_there(cell)).map(|cell| cell as u32).collect();
+        let is_in = |cell: &usize| self.vessel.makes_of_nothing || is_there(*cell);
+        let cells: Vec<u32> = (0..self.water.len()).filter(is_in).map(|cell| cell as u32).collect();
         let along = |axis: &Vec<f64>| match axis.is_empty() {
             true => Vec::new(),
             false => cells.iter().map(|&cell| axis[cell as usize]).collect(),
@@ -252,10 +254,30 @@ impl<const D: usize> Reactions<D> {
         for (own, spread) in self.populations.iter().zip(spread).filter(|(_, spread)| !spread.is_empty()) {
             for (c, &cell) in columns[own.species].iter_mut().zip(&cells) {
                 let cell = cell as usize;
-                *c = (spread[cell] / (self.water[cell] * own.retardation)).max(0.0);
+                *c = (spread[cell] / self.water[cell]).max(0.0);
             }
         }
-        Content { cells, places, columns }
+        let variances = self.variances(&cells, census);
+        Content { cells, places, columns, variances }
+    }
+
+    /// Squared standard errors of concentrations in some cells, if a law is bent; by species.
+    fn variances(&self, cells: &[u32], census: &[Census]) -> Vec<Vec<f64>> {
+        if self.vessel.noise.is_none() {
+            return Vec::new();
+        }
+        let mut all = vec![Vec::new(); self.populations.len()];
+        for (own, census) in self.populations.iter().zip(census).filter(|(_, it)| !it.cells.is_empty()) {
+            let Some(kept) = &own.kernels else { continue };
+            let squares = kept.projection.spread_squares(&census.cells, &census.squares);
+            let per = |cell: usize| 1.0 / self.water[cell];
+            let variance = |&cell: &u32| {
+                let cell = cell as usize;
+                squares[cell].max(0.0) * per(cell) * per(cell)
+            };
+            all[own.species] = cells.iter().map(variance).collect();
+        }
+        all
     }
 
     /// What a population loses, as parts of what is in each cell of the lattice, and what is made of it; nothing if it does not
@@ -274,7 +296,7 @@ impl<const D: usize> Reactions<D> {
                 loss[cell as usize] = new / old - 1.0;
             } else if new > old {
                 gains.cells.push(cell);
-                gains.masses.push((new - old) * self.water[cell as usize] * own.retardation);
+                gains.masses.push((new - old) * self.water[cell as usize]);
             }
         }
         // A column of no mass has no kernel to lose by.
@@ -311,7 +333,8 @@ impl<const D: usize> Reactions<D> {
                 }
             }
             census.cells.iter().for_each(|&cell| self.of_cell[cell as usize] = 0.0);
-            taken.add(merge::merge(&mut flocks, &census.places, maker.unit, (&self.stream, turn)));
+            let unit = light_unit(maker.unit, &flocks);
+            taken.add(merge::merge(&mut flocks, &census.places, unit, (&self.stream, turn)));
             inside += made.value() - taken.value();
         }
         gains.masses.iter().for_each(|mass| made.add(*mass));
@@ -324,6 +347,13 @@ impl<const D: usize> Reactions<D> {
         book.react(idx, made, taken);
         Ok(())
     }
+}
+
+/// What particles weigh against which they are light: their unit, or their mean if all have become lighter.
+fn light_unit<const D: usize>(unit: f64, flocks: &[&mut Flock<D>]) -> f64 {
+    let n: usize = flocks.iter().map(|flock| flock.len()).sum();
+    let mass: f64 = flocks.iter().flat_map(|flock| &flock.masses).sum();
+    if n > 0 { unit.min(mass / n as f64) } else { unit }
 }
 
 fn of<const D: usize>(flocks: &[Flock<D>], population: usize) -> impl Iterator<Item = &Flock<D>> {
@@ -347,10 +377,15 @@ fn own<const D: usize>(site: &Site<D>, idx: usize, width: Width) -> Result<Own, 
 /// What makes particles of each population, with a release of its own that gives nothing by itself.
 fn makers<const D: usize>(site: &Site<D>, releases: &mut Vec<Release<D>>) -> Vec<Maker> {
     let mut makers = Vec::new();
+    // Where nothing tells, a particle weighs what others do.
+    let numbers = releases.iter().map(|release| (release.unit * release.expected(), release.expected()));
+    let (mass, n) = numbers.fold((0.0, 0.0), |(mass, n), own| (mass + own.0, n + own.1));
+    let usual = if n > 0.0 { mass / n } else { 0.0 };
     for (population, own) in site.transport.populations.iter().enumerate() {
         let of_others = releases.iter().filter(|release| release.population == population);
         let of_others = of_others.map(|release| release.unit).fold(0.0, f64::max);
-        let unit = own.made.filter(|_| of_others == 0.0).unwrap_or(of_others);
+        let known = own.made.map_or(of_others, |made| made.max(of_others));
+        let unit = if known > 0.0 { known } else { usual };
         let origin = releases.len();
         let (from, to) = (f64::INFINITY, f64::INFINITY);
         let kind = Kind::Steady { n: 0, from, to, sampling: Sampling::Random };

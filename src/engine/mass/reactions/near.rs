@@ -49,6 +49,12 @@ impl<const D: usize> Crowd<D> {
             let fitting = ((high[axis] - low[axis]) / reach[axis]).floor().clamp(1.0, MOST_BINS);
             bins[axis] = fitting.min(most) as usize;
         }
+        // As many as there are particles serve: more would only be empty.
+        while bins.iter().product::<usize>() as f64 > 2.0 * most {
+            if let Some(largest) = bins.iter_mut().max() {
+                *largest = largest.div_ceil(2);
+            }
+        }
         let mut crowd =
             Self { species, members, low, high, ends, bins, order: Vec::new(), firsts: Vec::new(), reach };
         crowd.sort();
@@ -103,6 +109,10 @@ impl<const D: usize> Crowd<D> {
     /// The ways to a particle and to its images behind walls.
     pub fn images(&self, from: &Member<D>, to: &Member<D>, way: [f64; D]) -> [[Option<f64>; 3]; D] {
         std::array::from_fn(|axis| {
+            if self.is_ring(axis) {
+                let length = self.high[axis] - self.low[axis];
+                return [Some(way[axis]), Some(way[axis] - length), Some(way[axis] + length)];
+            }
             let behind = |wall: f64| (wall - from.at[axis]) + (wall - to.at[axis]);
             let low = (self.ends[axis][0] == End::Mirror).then(|| behind(self.low[axis]));
             let high = (self.ends[axis][1] == End::Mirror).then(|| behind(self.high[axis]));

@@ -6,6 +6,7 @@
 
 use super::super::super::density::End;
 use super::super::super::error::RunError;
+use super::super::book::Book;
 use super::super::flock::Flock;
 use super::super::world::Site;
 use super::census::{Census, OUTSIDE};
@@ -61,7 +62,23 @@ impl<const D: usize> Reactions<D> {
             book.react(population, *made, *taken);
         }
         place(products, &mut self.makers, flocks);
+        self.join(flocks, when.turn, book);
         Ok(())
+    }
+
+    /// Joins what meetings have left of particles.
+    fn join(&mut self, flocks: &mut [Flock<D>], turn: u64, book: &mut Book) {
+        let census = self.count(flocks);
+        for (population, (census, maker)) in census.iter().zip(&self.makers).enumerate() {
+            let mut own: Vec<&mut Flock<D>> =
+                flocks.iter_mut().filter(|flock| flock.population == population).collect();
+            if census.places.is_empty() {
+                continue;
+            }
+            let unit = super::light_unit(maker.unit, &own);
+            let gone = merge::merge(&mut own, &census.places, unit, (&self.stream, turn));
+            book.react(population, 0.0, gone);
+        }
     }
 
     fn crowds(

@@ -52,8 +52,7 @@ impl Meetings {
     /// Those of a plan whose reactions are of one or two species.
     pub fn new(plan: &Plan) -> Option<Self> {
         let kinetics = plan.chemistry.as_ref()?.kinetics.as_ref()?;
-        let of =
-            |component: usize| plan.species.iter().position(|species| species.terms == [(component, 1.0)]);
+        let of = |component: usize| plan.species_of(component);
         let mut list = Vec::new();
         for (reaction, own) in kinetics.reactions.iter().enumerate() {
             let all: Option<Vec<(usize, f64)>> =
@@ -229,17 +228,24 @@ struct Tools<'a, const D: usize> {
 }
 
 impl<const D: usize> Tools<'_, D> {
-    /// The population that is gone through, and the one that is searched: the former has fewer particles.
+    /// The population that is gone through, and the one that is searched: particles of the former give less, so that a meeting
+    /// is the end of one, and of the heavier ones many lighter ones take their part.
     fn roles(&self, crowds: &[Crowd<D>]) -> (usize, Option<usize>) {
         let population =
             |species: usize| crowds.iter().position(|crowd| crowd.species == species).unwrap_or(0);
         let first = population(self.meeting.first.0);
         match self.meeting.second.map(|(species, _)| population(species)) {
-            Some(second) if crowds[second].members.len() < crowds[first].members.len() => {
+            Some(second) if self.extent(&crowds[second]) < self.extent(&crowds[first]) => {
                 (second, Some(first))
             }
             second => (first, second),
         }
+    }
+
+    /// Mean extent that a particle is enough for.
+    fn extent(&self, crowd: &Crowd<D>) -> f64 {
+        let mass: f64 = crowd.members.iter().map(|member| member.mass).sum();
+        mass / (crowd.members.len().max(1) as f64 * self.share(crowd.species))
     }
 
     fn uniforms(&self, id: u64, idx: u64) -> [f64; 8] {
@@ -289,7 +295,7 @@ impl<const D: usize> Tools<'_, D> {
 
     /// A pair's chance in the step, as an exponent.
     ///
-    /// - Equation: `Λ = Δt f m_p m_q v/(e φ R_A R_B)`, twice that for two of one kind; `e = min(m/ν)`.
+    /// - Equation: `Λ = Δt f m_p m_q v/(e φ R_A R_B)`, `e = min(m/ν)`; two of one kind look for each other, once from either side.
     /// - Symbols: `f = r/(c_A c_B)` at the middle of the two kernels, `e` the extent if they meet.
     /// - Range: constant f: exact for Gaussian kernels; else f is that of the middle.
     /// - Source: methods, (5.2); with equal masses `f m v Δt/φ`.
@@ -308,10 +314,9 @@ impl<const D: usize> Tools<'_, D> {
         let parts = (self.step.per_mass)(middle, species) * (self.step.per_mass)(middle, others);
         // Rates are per volume of water.
         let water = 1.0 / (self.step.per_mass)(middle, usize::MAX);
-        let twice = if inner == outer { 2.0 } else { 1.0 };
         let f = factor(self.step, self.kinetics, self.meeting, middle);
         let overlap = density(crowds[inner].images(own, other, distance), variances);
-        twice * f * own.mass * other.mass * overlap * parts * water * self.step.dt / extent
+        f * own.mass * other.mass * overlap * parts * water * self.step.dt / extent
     }
 
     /// Takes what meets, and places what it makes.
