@@ -350,3 +350,37 @@ fn pairs_of_unequal_masses_keep_the_law() {
     tell(&format!("unequal: {mean:.4} ± {error:.4}"));
     assert!(error < 0.012 && (mean - 0.25).abs() < 3.0 * error, "{mean} ± {error}");
 }
+
+/// P2-d: in heterogeneous flow kernels along it make the best map, and those along axes a better one than one kernel for all.
+#[test]
+fn kernels_along_the_flow_map_a_plume_best() {
+    use lamella::engine::snapshot::Values;
+    let scene = include_str!("../experiments/kernels_in_aquifer/kernels_in_aquifer.lam");
+    let along = "kernel gaussian adaptive { grid 0.5 m, orient flow }";
+    let map = |kernel: &str, n: &str, seed: u64| -> Vec<f64> {
+        let finished = with(&edited(scene, along, kernel), &[("n", n)], seed);
+        let of = |snapshot: &lamella::engine::snapshot::Snapshot| match &snapshot.values {
+            Values::Binned { mean, .. } => Some(mean[0].clone()),
+            _ => None,
+        };
+        finished.snapshots.iter().find_map(of).expect("the scene has a map")
+    };
+    let truth = map("kernel histogram { grid 1 m }", "600000", 77);
+    let size: f64 = truth.iter().map(|c| c * c).sum();
+    let error = |kernel: &str| {
+        let of = |seed: u64| {
+            let found = map(kernel, "10500", seed);
+            let off: f64 = found.iter().zip(&truth).map(|(a, b)| (a - b) * (a - b)).sum();
+            (off / size).sqrt()
+        };
+        0.5 * (of(1) + of(2))
+    };
+    let errors = [
+        error(along),
+        error("kernel gaussian adaptive { grid 0.5 m }"),
+        error("kernel gaussian global { grid 0.5 m }"),
+        error("kernel histogram { grid 1 m }"),
+    ];
+    tell(&format!("along the flow, along axes, one, counted: {errors:.4?}"));
+    assert!(errors[0] < 0.92 * errors[1] && errors[1] < 0.92 * errors[2] && errors[0] < 0.75 * errors[3]);
+}

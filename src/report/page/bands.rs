@@ -27,7 +27,7 @@ const MOST_PANELS: usize = 9;
 const MOST_PLACES: usize = 300;
 
 /// Tables with curves, over a place or over time.
-const KINDS: [Kind; 8] = [
+const KINDS: [Kind; 9] = [
     Kind::Profile,
     Kind::Covariance,
     Kind::Total,
@@ -36,6 +36,7 @@ const KINDS: [Kind; 8] = [
     Kind::FirstPassage,
     Kind::Moments,
     Kind::Dilution,
+    Kind::Kernels,
 ];
 
 const PATTERNS: [Pattern; 4] = [&[], &[6.0, 2.5], &[2.0, 2.0], &[8.0, 2.5, 2.0, 2.5]];
@@ -182,6 +183,7 @@ impl Story<'_> {
             Kind::Moments => moment_name(courses[0]),
             Kind::FirstPassage => (format!("first passage of {name}{}", courses[0].station), "amount"),
             Kind::Dilution => (format!("dilution of {name}"), "dilution index"),
+            Kind::Kernels => kernel_name(courses[0]),
             _ => (format!("{name}{}", courses[0].station), "concentration"),
         };
         Panel {
@@ -242,6 +244,17 @@ fn moment_name(course: &Course) -> (String, &'static str) {
     }
 }
 
+/// The title of a size of kernels, and what it is.
+fn kernel_name(course: &Course) -> (String, &'static str) {
+    let name = &course.name;
+    match course.number {
+        "narrow" => (format!("kernels of {name}: a twentieth is narrower"), "bandwidth"),
+        "wide" => (format!("kernels of {name}: a twentieth is wider"), "bandwidth"),
+        "stretch" => (format!("kernels of {name}: longest over shortest"), "stretch"),
+        _ => (format!("kernels of {name}: median"), "bandwidth"),
+    }
+}
+
 fn heading(kind: Kind) -> String {
     let text = match kind {
         Kind::Profile => "Profiles",
@@ -252,6 +265,7 @@ fn heading(kind: Kind) -> String {
         Kind::FirstPassage => "First passage",
         Kind::Moments => "Moments",
         Kind::Dilution => "Dilution",
+        Kind::Kernels => "Kernels",
         other => other.name(),
     };
     escape(text)

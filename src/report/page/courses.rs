@@ -50,6 +50,7 @@ fn numbers_of(kind: Kind) -> &'static [&'static str] {
         Kind::FirstPassage => &["cumulative"],
         Kind::Moments => &["mean_x", "mean_y", "mean_z", "xx", "yy", "zz"],
         Kind::Dilution => &["index"],
+        Kind::Kernels => &["bandwidth", "narrow", "wide", "stretch"],
         _ => &[],
     }
 }
