@@ -87,6 +87,11 @@ pub enum RunError {
     Sink(String),
 }
 
+impl RunError {
+    /// The number where no particle is meant.
+    pub const OF_NO_PARTICLE: u64 = u64::MAX;
+}
+
 impl fmt::Display for RunError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -102,6 +107,10 @@ impl fmt::Display for RunError {
                 place(position),
                 precise(*value)
             ),
+            // In a cell of a lattice, which the reason names.
+            Self::Chemistry { step, particle: Self::OF_NO_PARTICLE, what, .. } => {
+                write!(f, "step {step}: the chemistry cannot be solved {what}")
+            }
             Self::Chemistry { step, particle, what, .. } => {
                 write!(f, "step {step}: the chemistry of particle {particle} cannot be solved: {what}")
             }

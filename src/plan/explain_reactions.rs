@@ -5,6 +5,7 @@
 use super::chemistry::{
     Activity, Chemistry, Equilibrium, Integrator, Kinetic, Kinetics, Law, Method, Splitting,
 };
+use super::kernels::Reacting;
 use super::transport::{Decay, Turn};
 use super::{Component, Plan, Species};
 use crate::diagnostic::number;
@@ -18,8 +19,13 @@ pub(super) fn lines(plan: &Plan) -> Vec<String> {
     let mut lines = Vec::new();
     if let Some(kinetics) = &chemistry.kinetics {
         lines.extend(kinetics.reactions.iter().map(|reaction| reaction_line(plan, kinetics, reaction)));
-        lines.push(method_line(kinetics.method).to_owned());
-        if has_error_control(kinetics.method) {
+        let meets = plan.reacting() == Some(Reacting::Pairs);
+        if meets {
+            lines.push("by pairs of particles that meet, each at most once in a step".to_owned());
+        } else {
+            lines.push(method_line(kinetics.method).to_owned());
+        }
+        if has_error_control(kinetics.method) && !meets {
             lines.extend(gate_lines(plan, chemistry, kinetics));
             lines.push(format!(
                 "tolerance {} relative, {}",

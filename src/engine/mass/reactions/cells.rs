@@ -158,8 +158,7 @@ fn refuse(plan: &Plan, content: &Content, (step, at): (u64, usize), failure: Fai
     let along = content.places.iter().filter_map(|axis| axis.get(at));
     let place: Vec<String> = along.map(|x| format!("{} m", precise(*x))).collect();
     let what = format!("in the cell at ({}): {}", place.join(", "), explain(plan, failure.why));
-    let particle = content.cells.get(at).copied().map_or(0, u64::from);
-    RunError::Chemistry { step, particle, what, why: failure.why }
+    RunError::Chemistry { step, particle: RunError::OF_NO_PARTICLE, what, why: failure.why }
 }
 
 /// Multiplies what has reacted, as far as there is enough for more of it.
