@@ -92,6 +92,14 @@ impl RunError {
     pub const OF_NO_PARTICLE: u64 = u64::MAX;
 }
 
+/// Of a particle, or in a cell of a lattice, which the reason names.
+fn chemistry(f: &mut fmt::Formatter<'_>, step: u64, particle: u64, what: &str) -> fmt::Result {
+    match particle {
+        RunError::OF_NO_PARTICLE => write!(f, "step {step}: the chemistry cannot be solved {what}"),
+        _ => write!(f, "step {step}: the chemistry of particle {particle} cannot be solved: {what}"),
+    }
+}
+
 impl fmt::Display for RunError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -107,13 +115,7 @@ impl fmt::Display for RunError {
                 place(position),
                 precise(*value)
             ),
-            // In a cell of a lattice, which the reason names.
-            Self::Chemistry { step, particle: Self::OF_NO_PARTICLE, what, .. } => {
-                write!(f, "step {step}: the chemistry cannot be solved {what}")
-            }
-            Self::Chemistry { step, particle, what, .. } => {
-                write!(f, "step {step}: the chemistry of particle {particle} cannot be solved: {what}")
-            }
+            Self::Chemistry { step, particle, what, .. } => chemistry(f, *step, *particle, what),
             Self::NonFinitePosition { step, particle } => {
                 write!(f, "step {step}: the position of particle {particle} is not a finite number")
             }
