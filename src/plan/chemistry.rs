@@ -7,7 +7,7 @@
 //! primary species are such combinations, and the concentrations follow by speciation.
 
 use super::averaging::Averaging;
-use super::tape::{Operation, Register};
+use super::tape::{Operation, Register, Tape};
 pub use crate::scenario::{Activity, Integrator, Splitting};
 use serde::{Deserialize, Serialize};
 
@@ -70,6 +70,13 @@ pub enum Law {
 pub struct Laws {
     pub operations: Vec<Operation>,
     pub rates: Vec<Register>,
+}
+
+impl Laws {
+    /// The program of one rate.
+    pub fn tape(&self, reaction: usize) -> Tape {
+        Tape { operations: self.operations[..=usize::from(self.rates[reaction])].to_vec() }
+    }
 }
 
 /// How kinetics are integrated over a step.

@@ -5,8 +5,7 @@
 
 use super::build_tape::SPECIES_INPUT;
 use super::chemistry::{Chemistry, Kinetic, Kinetics, Law};
-use super::tape::dual::differentiate;
-use super::tape::{Binary, Operation, Register};
+use super::tape::{Binary, Operation, Register, Tape};
 use super::transport::Transport;
 use super::{Axis, InstantReaction, Output, Plan, Quantity, shares};
 use crate::scenario::estimation::Estimation;
@@ -281,19 +280,19 @@ impl Plan {
         let makes = |reaction: &Kinetic| {
             reaction.changes.iter().any(|&(item, change)| change > 0.0 && self.is_of(item, species))
         };
-        let mut makers = kinetics.reactions.iter().zip(&kinetics.laws.rates).filter(|(it, _)| makes(it));
-        makers.all(|(_, rate)| PROBES.iter().all(|&probe| self.rate(kinetics, *rate, species, probe) == 0.0))
+        let makers = kinetics.reactions.iter().enumerate().filter(|(_, reaction)| makes(reaction));
+        let mut tapes = makers.map(|(idx, _)| kinetics.laws.tape(idx));
+        tapes.all(|tape| PROBES.iter().all(|&probe| self.rate(&tape, species, probe) == 0.0))
     }
 
     /// A rate without a species, where all others have some concentration.
-    fn rate(&self, kinetics: &Kinetics, rate: Register, species: usize, probe: f64) -> f64 {
+    fn rate(&self, tape: &Tape, species: usize, probe: f64) -> f64 {
         let mut inputs = vec![0.0; usize::from(SPECIES_INPUT)];
         for axis in &self.axes {
             inputs[axis.index] = axis.low + 0.37 * (axis.high - axis.low);
         }
         inputs.extend((0..self.species.len()).map(|own| if own == species { 0.0 } else { probe }));
-        let (values, _) = differentiate(&kinetics.laws.operations, &inputs, 4, self.species.len());
-        values[usize::from(rate)]
+        tape.evaluate(&inputs)
     }
 }
 

@@ -22,12 +22,15 @@ impl<const D: usize> Scene<'_, D> {
         self.site.plan.kernels.as_ref().is_some_and(|kernels| kernels.shows)
     }
 
-    fn find(&self, population: usize) -> Result<(Finder, Found), RunError> {
-        let finder = Finder::new(self.site, population, self.width)?.along_flow(self.site, self.t);
-        let flocks: Vec<&Flock<D>> =
-            self.flocks.iter().filter(|flock| flock.population == population).collect();
-        let found = finder.find(&flocks, self.units.row(population), None)?;
-        Ok((finder, found))
+    fn find(&self, population: usize) -> Result<&(Finder, Found), RunError> {
+        let find = || {
+            let finder = Finder::new(self.site, population, self.width)?.along_flow(self.site, self.t);
+            let flocks: Vec<&Flock<D>> =
+                self.flocks.iter().filter(|flock| flock.population == population).collect();
+            let found = finder.find(&flocks, self.units.row(population), None)?;
+            Ok((finder, found))
+        };
+        self.kernels[population].get_or_init(find).as_ref().map_err(Clone::clone)
     }
 
     /// Concentrations of a population in bins, by kernels on cells.

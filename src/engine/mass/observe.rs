@@ -11,6 +11,7 @@ use super::book::Book;
 use super::fields::Binned;
 use super::flock::{self, Flock};
 use super::gate;
+use super::kernels::{Finder, Found};
 use super::total::Total;
 use super::units::Units;
 use super::world::Site;
@@ -19,6 +20,7 @@ use crate::maths::wide::Width;
 use crate::plan::{Output, OutputKind, Station};
 use crate::state::grid::Grid;
 use crate::state::particles::CHUNK;
+use std::sync::OnceLock;
 
 /// What is looked at.
 pub struct Scene<'a, const D: usize> {
@@ -33,7 +35,9 @@ pub struct Scene<'a, const D: usize> {
     /// s
     pub t: f64,
     /// What reactions have made and no particle carries yet, by population.
-    pub pending: &'a [f64],
+    pub pending: Vec<f64>,
+    /// Kernels of each population, found when an output first asks: several outputs of one time share them.
+    pub kernels: Vec<OnceLock<Result<(Finder, Found), RunError>>>,
 }
 
 impl<const D: usize> Scene<'_, D> {

@@ -31,6 +31,7 @@ use crate::maths::exact::{MOST_TERMS, Quanta};
 use crate::maths::wide::Width;
 use crate::plan::Normals;
 use crate::state::stream::{Purpose, Stream};
+use std::sync::OnceLock;
 
 /// Steps that a block is taken through before the next one.
 const TILE: u64 = 8;
@@ -258,7 +259,7 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
 
     fn scene(&self, t: f64) -> Scene<'_, D> {
         let (mut heaviest, mut quanta) = (self.units.largest(), self.quanta);
-        let mut pending: &[f64] = &[];
+        let mut pending = Vec::new();
         if let Some(reactions) = &self.reactions {
             let masses = self.flocks.iter().flat_map(|flock| &flock.masses);
             heaviest = masses.fold(heaviest, |most, &mass| most.max(mass));
@@ -266,7 +267,8 @@ impl<'a, const D: usize, M: Medium<D>> Run<'a, D, M> {
         }
         let (site, flocks, units, book) = (self.site, &self.flocks[..], &self.units, &self.book);
         let width = self.tracker.width;
-        Scene { site, flocks, units, heaviest, quanta, book, width, t, pending }
+        let kernels = site.transport.populations.iter().map(|_| OnceLock::new()).collect();
+        Scene { site, flocks, units, heaviest, quanta, book, width, t, pending, kernels }
     }
 
     /// The outputs of a time; between two steps those of a copy that goes a part of the next one.

@@ -37,6 +37,7 @@ use cells::{Content, Vessel};
 use census::{Census, OUTSIDE};
 use make::{Gains, Maker};
 use pairs::Meetings;
+use std::sync::Arc;
 
 /// Relative change of the effective number of particles with which kernels are found again.
 const CHANGED: f64 = 0.05;
@@ -71,10 +72,9 @@ pub struct Reactions<const D: usize> {
     places: [Vec<f64>; 3],
     populations: Vec<Own>,
     makers: Vec<Maker>,
-    pending: Vec<f64>,
     vessel: Vessel,
     /// Where pairs meet.
-    meetings: Option<Meetings>,
+    meetings: Option<Arc<Meetings>>,
     is_collocation: bool,
     quanta: Quanta,
     stream: Stream,
@@ -143,13 +143,12 @@ impl<const D: usize> Reactions<D> {
             low: site.low,
             water,
             places,
-            pending: vec![0.0; populations.len()],
             populations,
             makers,
             vessel: Vessel::new(plan, n_cells)?,
             meetings: match kernels.reacting {
                 Some(Reacting::Pairs) => {
-                    Some(Meetings::new(plan).ok_or_else(|| unsound("reactions of no pairs"))?)
+                    Some(Arc::new(Meetings::new(plan).ok_or_else(|| unsound("reactions of no pairs"))?))
                 }
                 _ => None,
             },
@@ -167,8 +166,8 @@ impl<const D: usize> Reactions<D> {
     }
 
     /// What was made and is no particle yet, by population.
-    pub fn pending(&self) -> &[f64] {
-        &self.pending
+    pub fn pending(&self) -> Vec<f64> {
+        self.makers.iter().map(|maker| maker.pending).collect()
     }
 
     /// Reactions of a step, where particles are now. `variances` are those of displacements in a time, by population and place.
@@ -343,7 +342,6 @@ impl<const D: usize> Reactions<D> {
             return Err(unsound("masses that are no numbers"));
         }
         maker.make(&gains, inside, (&own.finder.lattice, &self.low), (&self.stream, turn), flocks);
-        self.pending[idx] = maker.pending;
         book.react(idx, made, taken);
         Ok(())
     }

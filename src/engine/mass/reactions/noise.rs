@@ -25,7 +25,7 @@ impl Noise {
     /// Of a plan with one reaction at a rate, whose law is not linear in each species.
     pub fn new(plan: &Plan) -> Option<Self> {
         let kinetics = plan.chemistry.as_ref()?.kinetics.as_ref()?;
-        let ([reaction], [rate]) = (&kinetics.reactions[..], &kinetics.laws.rates[..]) else { return None };
+        let [reaction] = &kinetics.reactions[..] else { return None };
         if !plan.reactions.is_empty() {
             return None;
         }
@@ -36,10 +36,9 @@ impl Noise {
             Law::Saturation { species, .. } => vec![*species],
             Law::Expression => (0..plan.species.len()).collect(),
         };
-        let operations = kinetics.laws.operations[..=usize::from(*rate)].to_vec();
         let share = |own: &crate::plan::Species| own.terms.first().map_or(1.0, |(_, share)| *share);
         let shares = plan.species.iter().map(share).collect();
-        (!species.is_empty()).then_some(Self { tape: Tape { operations }, shares, species })
+        (!species.is_empty()).then_some(Self { tape: kinetics.laws.tape(0), shares, species })
     }
 
     /// What a rate of estimated concentrations has to be multiplied by to be that of the true ones on average.

@@ -28,7 +28,7 @@ impl<const D: usize> Reactions<D> {
         (when, t, dt): (Turn, f64, f64),
     ) -> Result<(), RunError> {
         let census = self.count(flocks);
-        let needs_fields = meetings.need_concentrations(site.plan);
+        let needs_fields = meetings.need_concentrations();
         let mut spread = Vec::new();
         if !self.is_collocation || needs_fields {
             spread = self.spread(flocks, units, &census, when.step)?;

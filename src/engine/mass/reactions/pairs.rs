@@ -8,9 +8,9 @@ use super::super::flock::{self, Flock};
 use super::make::Maker;
 use super::near::{Crowd, Member};
 use crate::maths::scalar::{cos, exp, ln};
-use crate::plan::chemistry::{Kinetic, Kinetics, Law};
-use crate::plan::tape::dual::differentiate;
-use crate::plan::{Axis, Plan};
+use crate::plan::Plan;
+use crate::plan::chemistry::{Kinetic, Law};
+use crate::plan::tape::Tape;
 use crate::state::stream::Stream;
 
 /// Standard deviations of the sum of two kernels within which two particles may meet.
@@ -25,6 +25,15 @@ pub struct Meeting {
     pub first: (usize, f64),
     pub second: Option<(usize, f64)>,
     products: Vec<(usize, f64)>,
+    law: Factor,
+}
+
+/// The rate over the concentrations of what meets.
+#[derive(Debug, Clone)]
+enum Factor {
+    Constant(f64),
+    /// Of this rate.
+    Varying(Tape),
 }
 
 /// Everything that particles do by meeting.
@@ -69,17 +78,18 @@ impl Meetings {
             if second.is_none() && order_of(&own.law, first.0) == Some(2.0) {
                 second = Some(first);
             }
-            list.push(Meeting { reaction, first, second, products });
+            let law = match constant(first, second, own) {
+                Some(constant) => Factor::Constant(constant),
+                None => Factor::Varying(kinetics.laws.tape(reaction)),
+            };
+            list.push(Meeting { reaction, first, second, products, law });
         }
         Some(Self { list })
     }
 
     /// Whether chances hang on concentrations.
-    pub fn need_concentrations(&self, plan: &Plan) -> bool {
-        let Some(kinetics) = plan.chemistry.as_ref().and_then(|it| it.kinetics.as_ref()) else {
-            return false;
-        };
-        self.list.iter().any(|meeting| constant(meeting, &kinetics.reactions[meeting.reaction]).is_none())
+    pub fn need_concentrations(&self) -> bool {
+        self.list.iter().any(|meeting| matches!(meeting.law, Factor::Varying(_)))
     }
 }
 
@@ -93,11 +103,11 @@ fn order_of(law: &Law, species: usize) -> Option<f64> {
 }
 
 /// The rate over the concentrations of what meets, where that is a constant.
-fn constant(meeting: &Meeting, reaction: &Kinetic) -> Option<f64> {
+fn constant(first: (usize, f64), second: Option<(usize, f64)>, reaction: &Kinetic) -> Option<f64> {
     let Law::MassAction { constant, orders } = &reaction.law else { return None };
-    let mut wanted: Vec<(usize, f64)> = vec![(meeting.first.0, 1.0)];
-    match meeting.second {
-        Some((species, _)) if species == meeting.first.0 => wanted[0].1 = 2.0,
+    let mut wanted: Vec<(usize, f64)> = vec![(first.0, 1.0)];
+    match second {
+        Some((species, _)) if species == first.0 => wanted[0].1 = 2.0,
         Some((species, _)) => wanted.push((species, 1.0)),
         None => {}
     }
@@ -112,15 +122,14 @@ fn constant(meeting: &Meeting, reaction: &Kinetic) -> Option<f64> {
 /// - Range: any law; below the floors `f` is that at the floors.
 /// - Source: methods, section 5.2.
 /// - Shape: one number.
-fn factor<const D: usize>(step: &Step<D>, kinetics: &Kinetics, meeting: &Meeting, at: [f64; D]) -> f64 {
-    let own = &kinetics.reactions[meeting.reaction];
-    if let Some(constant) = constant(meeting, own) {
-        return constant;
-    }
+fn factor<const D: usize>(step: &Step<D>, meeting: &Meeting, at: [f64; D]) -> f64 {
+    let tape = match &meeting.law {
+        Factor::Constant(constant) => return *constant,
+        Factor::Varying(tape) => tape,
+    };
     let Some(concentrations) = step.concentrations else { return 0.0 };
     let mut inputs = vec![0.0; 4];
-    let place = |axis: &Axis, x: f64, inputs: &mut Vec<f64>| inputs[axis.index] = x;
-    step.plan.axes.iter().zip(at).for_each(|(axis, x)| place(axis, x, &mut inputs));
+    step.plan.axes.iter().zip(at).for_each(|(axis, x)| inputs[axis.index] = x);
     inputs[3] = step.t + 0.5 * step.dt;
     let mut species = concentrations(at);
     let floor = |idx: usize| {
@@ -133,9 +142,7 @@ fn factor<const D: usize>(step: &Step<D>, kinetics: &Kinetics, meeting: &Meeting
         below *= species[idx];
     }
     inputs.extend(species);
-    let n = step.plan.species.len();
-    let (values, _) = differentiate(&kinetics.laws.operations, &inputs, 4, n);
-    values[usize::from(kinetics.laws.rates[meeting.reaction])] / below
+    tape.evaluate(&inputs) / below
 }
 
 /// Density of two kernels meeting, of which walls show images.
@@ -171,10 +178,7 @@ pub fn meet<const D: usize>(
     crowds: &mut [Crowd<D>],
     exchanged: &mut Exchanged,
 ) -> Vec<Product<D>> {
-    let Some(kinetics) = step.plan.chemistry.as_ref().and_then(|it| it.kinetics.as_ref()) else {
-        return Vec::new();
-    };
-    let tools = Tools { step, kinetics, meeting };
+    let tools = Tools { step, meeting };
     let (outer, inner) = tools.roles(crowds);
     // Who may react at all, with everybody there: few are looked at again.
     let crowd = &crowds[outer];
@@ -223,7 +227,6 @@ fn chance(hazard: f64) -> f64 {
 
 struct Tools<'a, const D: usize> {
     step: &'a Step<'a, D>,
-    kinetics: &'a Kinetics,
     meeting: &'a Meeting,
 }
 
@@ -276,7 +279,7 @@ impl<const D: usize> Tools<'_, D> {
             // In water alone.
             let retarded = part * (self.step.per_mass)(own.at, usize::MAX).recip();
             let share = self.share(crowds[outer].species);
-            return share * factor(self.step, self.kinetics, self.meeting, own.at) * retarded * self.step.dt;
+            return share * factor(self.step, self.meeting, own.at) * retarded * self.step.dt;
         };
         let is_like = inner == outer;
         let mut sum = 0.0;
@@ -314,7 +317,7 @@ impl<const D: usize> Tools<'_, D> {
         let parts = (self.step.per_mass)(middle, species) * (self.step.per_mass)(middle, others);
         // Rates are per volume of water.
         let water = 1.0 / (self.step.per_mass)(middle, usize::MAX);
-        let f = factor(self.step, self.kinetics, self.meeting, middle);
+        let f = factor(self.step, self.meeting, middle);
         let overlap = density(crowds[inner].images(own, other, distance), variances);
         f * own.mass * other.mass * overlap * parts * water * self.step.dt / extent
     }
