@@ -227,10 +227,13 @@ impl Text<'_> {
     fn push(&mut self, record: &[Field]) -> Result<(), ReadError> {
         for ((column, &idx), numbers) in self.wanted.iter().zip(&self.order).zip(&mut self.numbers) {
             let field = &record[idx];
-            csv::number(field, &column.name)?;
+            let text = field.text.trim();
             // The digits go to SI before they become binary: centimetres and metres give the same bits.
-            let value = column.unit.to_si(field.text.trim());
-            numbers.push(value.ok_or_else(|| too_large(&column.name).at(field.place()))?);
+            let Some(value) = column.unit.to_si(text).filter(|_| csv::is_decimal(text)) else {
+                csv::number(field, &column.name)?;
+                return Err(too_large(&column.name).at(field.place()));
+            };
+            numbers.push(value);
         }
         Ok(())
     }

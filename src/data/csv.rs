@@ -15,11 +15,15 @@ pub fn text(bytes: &[u8]) -> Result<&str, ReadError> {
     })
 }
 
+/// Whether nothing but what decimal numbers are written with is there.
+pub fn is_decimal(text: &str) -> bool {
+    text.bytes().all(|c| c.is_ascii_digit() || matches!(c, b'+' | b'-' | b'.' | b'e' | b'E'))
+}
+
 /// A decimal number; what Rust reads beyond that (`inf`, `nan`) is none.
 pub fn number(field: &Field, column: &str) -> Result<f64, ReadError> {
     let text = field.text.trim();
-    let is_decimal = text.bytes().all(|c| c.is_ascii_digit() || b"+-.eE".contains(&c));
-    if let Some(number) = text.parse::<f64>().ok().filter(|number| is_decimal && number.is_finite()) {
+    if let Some(number) = text.parse::<f64>().ok().filter(|number| is_decimal(text) && number.is_finite()) {
         return Ok(number);
     }
     let wrong = |message: String| ReadError::new(Kind::Value, message).at(field.place());
@@ -103,7 +107,9 @@ impl<'a> Reader<'a> {
     fn field(&mut self) -> Result<Field<'a>, ReadError> {
         let (line, column) = (self.line, self.column);
         if !self.rest.starts_with('"') {
-            let end = self.rest.find([self.separator, '\n']).unwrap_or(self.rest.len());
+            let separator = self.separator as u8;
+            let ends = |c: u8| c == separator || c == b'\n';
+            let end = self.rest.bytes().position(ends).unwrap_or(self.rest.len());
             let text = &self.rest[..end];
             self.skip(text.strip_suffix('\r').unwrap_or(text).len());
             return Ok(Field { text: Cow::Borrowed(text.trim_end_matches('\r')), line, column });
@@ -131,9 +137,14 @@ impl<'a> Reader<'a> {
 
     /// Passes over bytes, which may hold ends of lines inside quotes.
     fn skip(&mut self, n: usize) {
-        for c in self.rest[..n].chars() {
-            (self.line, self.column) =
-                if c == '\n' { (self.line + 1, 1) } else { (self.line, self.column + 1) };
+        let passed = &self.rest[..n];
+        let of_line = |text: &str| text.chars().count() as u32;
+        match passed.rfind('\n') {
+            None => self.column += of_line(passed),
+            Some(last) => {
+                self.line += passed.bytes().filter(|&c| c == b'\n').count() as u32;
+                self.column = 1 + of_line(&passed[last + 1..]);
+            }
         }
         self.rest = &self.rest[n..];
     }

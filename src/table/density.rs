@@ -157,9 +157,11 @@ impl DensityTable {
 
 /// Writes it, whole or not at all.
 pub fn write_density(target: &Path, table: &DensityTable) -> Result<PathBuf, TableError> {
-    let schema = arrow_schema(&table.columns(), None);
+    let columns = table.columns();
+    let schema = arrow_schema(&columns, None);
     let notes = vec![(KEY.to_owned(), table.notes.clone())];
-    let mut sheet = Sheet::with_notes(target, schema.clone(), notes)?;
+    let varied: Vec<&str> = columns.iter().map(|column| column.name.as_str()).collect();
+    let mut sheet = Sheet::with_notes(target, schema.clone(), notes, &varied)?;
     let n = table.density.len();
     let mut next = 0;
     while next < n {

@@ -11,6 +11,7 @@ use parquet::arrow::ArrowWriter;
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
+use parquet::schema::types::ColumnPath;
 use std::fs::{self, File};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -101,19 +102,21 @@ impl Sheet {
     /// The footer goes into the file's metadata, where most tools look, and into the Arrow schema,
     /// where pyarrow and pandas look.
     pub fn create(target: &Path, schema: SchemaRef, footer: &Footer) -> Result<Self, TableError> {
-        Self::with_notes(target, schema, footer.key_values())
+        Self::with_notes(target, schema, footer.key_values(), &[])
     }
 
-    /// A table that comes from no scene: notes are by their keys.
+    /// A table that comes from no scene: notes are by their keys. In columns that are named hardly a value is there twice, so
+    /// that a dictionary of them is not tried.
     pub fn with_notes(
         target: &Path,
         schema: SchemaRef,
         pairs: Vec<(String, String)>,
+        varied: &[&str],
     ) -> Result<Self, TableError> {
         let schema =
             schema.as_ref().clone().with_metadata(pairs.iter().cloned().collect::<arrow_schema::Metadata>());
         let (draft, file) = Draft::new(target)?;
-        let writer = ArrowWriter::try_new(file, Arc::new(schema), Some(properties(pairs)))
+        let writer = ArrowWriter::try_new(file, Arc::new(schema), Some(properties(pairs, varied)))
             .map_err(|reason| TableError::parquet(target, reason, 0))?;
         Ok(Self { draft, writer, n_rows: 0 })
     }
@@ -141,9 +144,13 @@ impl Sheet {
     }
 }
 
-fn properties(pairs: Vec<(String, String)>) -> WriterProperties {
+fn properties(pairs: Vec<(String, String)>, varied: &[&str]) -> WriterProperties {
     let metadata = pairs.into_iter().map(|(key, value)| KeyValue::new(key, value)).collect();
-    WriterProperties::builder()
+    let start = WriterProperties::builder();
+    let start = varied.iter().fold(start, |start, name| {
+        start.set_column_dictionary_enabled(ColumnPath::from((*name).to_owned()), false)
+    });
+    start
         .set_created_by(CREATED_BY.to_owned())
         .set_compression(Compression::ZSTD(ZstdLevel::try_new(3).unwrap_or_default()))
         .set_max_row_group_row_count(Some(ROW_GROUP))

@@ -105,14 +105,20 @@ impl Unit {
     /// The power of ten moves the decimal point of the digits, so `7.5 cm` and `0.075 m` are one
     /// and the same number, bit by bit.
     pub fn to_si(&self, digits: &str) -> Option<f64> {
+        let scaled = |value: f64| {
+            let value = value * self.numerator / self.denominator;
+            value.is_finite().then_some(value)
+        };
+        // Long tables have millions of numbers.
+        if self.decimal == 0 {
+            return scaled(digits.parse().ok()?);
+        }
         let (mantissa, exponent) = match digits.split_once(['e', 'E']) {
             Some((mantissa, exponent)) => (mantissa, exponent.parse::<i64>().unwrap_or(i64::from(i32::MAX))),
             None => (digits, 0),
         };
         let exponent = exponent.saturating_add(i64::from(self.decimal));
-        let value: f64 = format!("{mantissa}e{exponent}").parse().ok()?;
-        let value = value * self.numerator / self.denominator;
-        value.is_finite().then_some(value)
+        scaled(format!("{mantissa}e{exponent}").parse().ok()?)
     }
 
     /// The SI value of one of this unit.

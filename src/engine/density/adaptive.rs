@@ -4,6 +4,7 @@
 //! particles are.
 
 use super::super::parallel;
+use super::choice::Constants;
 use super::classes::{Fill, Table, bandwidth_of, class_of};
 use super::curvature::{Curvatures, curvatures};
 use super::frame::Frame;
@@ -13,22 +14,19 @@ use super::kinds::{Adaptive, Cell, Estimate, Start};
 use super::lattice::{AXES, End, Field, Lattice, Window};
 use super::limits::{GROWTH, Limits};
 use super::local::Basis;
+use super::settled::{Before, Ends};
 use super::smoothed::Smoothed;
 use super::stencil::scatter;
 use super::tally::{Tally, Weighing};
 use super::taps::{Integral, Line, REACH, Taps};
 use crate::maths::vector::{ln, pow};
 use crate::maths::wide::Width;
-use std::f64::consts::PI;
 
 /// Cells that a thread takes at once.
 pub(super) const PORTION: usize = 64;
 
 /// Of the largest density, what one is at least where particles are.
 const LEAST: f64 = 1e-9;
-
-/// From this loop on the running mean of the error may end the iteration.
-const RUNNING: usize = 8;
 
 pub(super) struct Search<'a> {
     pub(super) lattice: &'a Lattice,
@@ -47,23 +45,8 @@ pub(super) struct Search<'a> {
     pub(super) per_mass: f64,
     pub(super) d: f64,
     pub(super) constants: Constants,
-}
-
-/// Logarithms of what hangs on nothing but the number of axes.
-pub(super) struct Constants {
-    pub(super) support: f64,
-    pub(super) curvature: f64,
-}
-
-impl Constants {
-    fn new(d: f64) -> Self {
-        Self {
-            support: 0.25 * ln((d + 2.0) * pow(8.0 * PI, 0.5 * d) / 4.0),
-            curvature: ln((1.0 + pow(2.0, 0.5 * d + 2.0)) / (3.0 * pow(2.0, 4.0 / (d + 4.0)))) / (d + 6.0)
-                + ln(d + 2.0) / (d + 4.0)
-                - ln(d + 4.0) / (d + 6.0),
-        }
-    }
+    /// Whether it began with kernels that are nearly right.
+    is_near: bool,
 }
 
 /// The density of particles that are counted on a lattice.
@@ -100,7 +83,25 @@ fn solve(
     bases: Option<&Vec<(Basis, bool)>>,
     width: Width,
 ) -> Estimate {
-    let (counts, unit) = tally.pseudo_counts(adaptive.weighing);
+    let (search, found) = iterate((lattice, tally), (adaptive, limits), bases, width);
+    match found {
+        None => Estimate::unknown(lattice),
+        Some(history) => {
+            let (_, unit) = tally.pseudo_counts(adaptive.weighing);
+            search.finish(tally, unit, history)
+        }
+    }
+}
+
+/// Kernels of all cells, their history and whether they are settled; no history where masses are no numbers.
+pub(super) fn iterate<'a>(
+    (lattice, tally): (&'a Lattice, &Tally),
+    (adaptive, limits): (&'a Adaptive, Limits),
+    bases: Option<&Vec<(Basis, bool)>>,
+    width: Width,
+) -> (Search<'a>, Option<(Vec<f64>, bool)>) {
+    let (counts, _) = tally.pseudo_counts(adaptive.weighing);
+    let constants = Constants::new(lattice, &limits);
     let mut search = Search {
         lattice,
         adaptive,
@@ -114,17 +115,28 @@ fn solve(
         held: None,
         per_mass: 1.0,
         d: lattice.d as f64,
-        constants: Constants::new(lattice.d as f64),
+        constants,
+        is_near: false,
     };
     if search.counts.iter().any(|count| !(count.is_finite() && *count > 0.0)) {
-        return Estimate::unknown(lattice);
+        return (search, None);
     }
-    search.begin(tally, bases);
-    let mut history = vec![search.mean_bandwidth()];
     let mut ends = Ends::default();
-    let mut is_settled = false;
-    for _ in 0..if search.cells.is_empty() { 0 } else { adaptive.most_loops } {
-        let old = search.cells.clone();
+    search.begin(tally, bases);
+    let coarser = search.take_coarser(tally, bases);
+    search.is_near = coarser.is_some();
+    if coarser.is_some() {
+        ends.errors.push(search.error());
+    }
+    if !search.cells.is_empty() {
+        search.spread();
+    }
+    let (mut history, is_settled_coarser) = coarser.unwrap_or((vec![search.mean_bandwidth()], false));
+    // Coarser cells that resolve all kernels say as much of them as these do.
+    let mut is_settled = is_settled_coarser && search.is_resolved();
+    let n_loops = if is_settled || search.cells.is_empty() { 0 } else { adaptive.most_loops };
+    for _ in 0..n_loops {
+        let old: Vec<Before> = search.cells.iter().map(Before::of).collect();
         search.go_on();
         history.push(search.mean_bandwidth());
         is_settled = ends.are_reached(&search, &old);
@@ -132,7 +144,7 @@ fn solve(
             break;
         }
     }
-    search.finish(tally, unit, (history, is_settled))
+    (search, Some((history, is_settled)))
 }
 
 impl Search<'_> {
@@ -148,31 +160,26 @@ impl Search<'_> {
             Start::Times(factor) => factor * reference,
             Start::Bandwidth(h) => h,
         };
-        let cell = |&idx: &u32| {
-            let sigma = (2.0 * h).clamp(self.limits.support[0], self.limits.support[1]);
-            let mut cell = Cell { at: lattice.cell(idx as usize), sigma, h, ..Cell::default() };
-            if bases.is_none() {
-                self.limit(&mut cell, [h; AXES]);
-            }
-            cell
-        };
+        let sigma = (2.0 * h).clamp(self.limits.support[0], self.limits.support[1]);
+        let mut first = Cell { sigma, h, ..Cell::default() };
+        if bases.is_none() {
+            self.limit(&mut first, [h; AXES]);
+        }
+        let cell = |&idx: &u32| Cell { at: lattice.cell(idx as usize), ..first.clone() };
         self.cells = tally.cells.iter().map(cell).collect();
         let places: Vec<[usize; AXES]> = self.cells.iter().map(|cell| cell.at).collect();
         (self.held, self.per_mass) = (Held::new(lattice, &places), n / tally.mass());
         if let Some(bases) = bases {
             self.turn(bases);
         }
-        if !self.cells.is_empty() {
-            self.spread();
-        }
     }
 
-    fn mean_bandwidth(&self) -> f64 {
+    pub(super) fn mean_bandwidth(&self) -> f64 {
         self.cells.iter().map(|cell| cell.h).sum::<f64>() / self.cells.len().max(1) as f64
     }
 
     /// Bandwidths along axes within their bounds, and what follows from them.
-    fn limit(&self, cell: &mut Cell, h: [f64; AXES]) {
+    pub(super) fn limit(&self, cell: &mut Cell, h: [f64; AXES]) {
         if self.is_oriented {
             return self.limit_along(cell, h);
         }
@@ -224,7 +231,14 @@ impl Search<'_> {
         } else {
             self.average(tools);
         }
-        self.for_all(&|search, cell, _| search.choose(cell));
+        let is_damped = self.is_near;
+        self.for_all(&|search, cell, _| {
+            let old = (cell.h, cell.s);
+            search.choose(cell);
+            if is_damped {
+                search.damp(cell, old);
+            }
+        });
         self.fill_smooth();
         self.spread();
     }
@@ -237,15 +251,27 @@ impl Search<'_> {
         let range = self.widths();
         let lattice = behind_walls(self.lattice);
         let tools = (&lattice, self.integral, self.width);
-        let mut place = 0;
-        for i in 0..fields.len() {
-            for j in 0..=i {
-                let mut product = fields[i].clone();
-                product.values.iter_mut().zip(&fields[j].values).for_each(|(own, other)| *own *= other);
-                let product = Smoothed::new(tools, (self.adaptive.is_fast, &window), product, range);
-                self.for_all(&|_, cell, taps| cell.psi[place] = product.at(tools, cell, taps));
-                place += 1;
+        let product = |(i, j): (usize, usize)| {
+            let mut product = fields[i].clone();
+            product.values.iter_mut().zip(&fields[j].values).for_each(|(own, other)| *own *= other);
+            Smoothed::new(tools, (self.adaptive.is_fast, &window), product, range)
+        };
+        let pairs: Vec<(usize, usize)> =
+            (0..fields.len()).flat_map(|i| (0..=i).map(move |j| (i, j))).collect();
+        // Those that keep no fine field need little room, and are read together.
+        let mut first = 0;
+        while first < pairs.len() {
+            let mut own = vec![product(pairs[first])];
+            if own[0].is_small() {
+                own.extend(pairs[first + 1..].iter().map(|&pair| product(pair)));
             }
+            let places = first..first + own.len();
+            first = places.end;
+            self.for_all(&|_, cell, taps| {
+                let mut psi = cell.psi;
+                Smoothed::all_at(&own, tools, cell, (taps, &mut psi[places.clone()]));
+                cell.psi = psi;
+            });
         }
     }
 
@@ -408,7 +434,12 @@ impl Search<'_> {
         let n = self.lattice.n_cells();
         let (mut density, mut standard_error) = (vec![0.0; n], vec![0.0; n]);
         if !self.cells.is_empty() {
-            density = self.density_of((counts, per_mass), &all, false).values;
+            let is_there = matches!(self.adaptive.weighing, Weighing::OfAll | Weighing::Mean);
+            density = if is_there && !self.is_oriented {
+                self.rho.1.whole(self.lattice.cells)
+            } else {
+                self.density_of((counts, per_mass), &all, false).values
+            };
             density.truncate(n);
             density.iter_mut().for_each(|value| *value *= unit);
             if self.held.is_some() || self.is_oriented {
@@ -444,40 +475,4 @@ pub(super) fn behind_walls(lattice: &Lattice) -> Lattice {
     let held = own.ends.as_flattened_mut().iter_mut().filter(|end| matches!(end, End::Held(_)));
     held.for_each(|end| *end = End::Mirror);
     own
-}
-
-/// What ends the iteration.
-#[derive(Default)]
-struct Ends {
-    errors: Vec<f64>,
-}
-
-impl Ends {
-    /// Whether anything has changed by less than the tolerance: the predicted error, densities, bandwidths, or from some loop
-    /// on the running mean of the error.
-    fn are_reached(&mut self, search: &Search, old: &[Cell]) -> bool {
-        let (cells, d) = (&search.cells, search.d);
-        let n: f64 = search.counts.iter().sum();
-        let error = |cell: &Cell| {
-            let h = cell.h;
-            let variance = cell.n / (pow(4.0 * PI, 0.5 * d) * pow(h, d));
-            (variance + 0.25 * cell.roughness * h * h * h * h) / (n * n)
-        };
-        let root = |squares: f64| (squares / cells.len() as f64).sqrt();
-        let total = root(cells.iter().map(|cell| error(cell) * error(cell)).sum());
-        let change = |new: f64, old: f64| (new / old - 1.0) * (new / old - 1.0);
-        let pairs = || cells.iter().zip(old);
-        let [most, most_old] =
-            [cells, old].map(|all| all.iter().fold(0.0_f64, |most, cell| most.max(cell.rho)));
-        let of_densities = root(pairs().map(|(new, old)| change(new.rho / most, old.rho / most_old)).sum());
-        let of_bandwidths = root(pairs().map(|(new, old)| change(new.h, old.h)).sum());
-        let tolerance = search.adaptive.tolerance;
-        let before = self.errors.last().copied();
-        let mean = |errors: &[f64]| errors.iter().sum::<f64>() / errors.len() as f64;
-        let mean_before = (self.errors.len() + 1 >= RUNNING).then(|| mean(&self.errors));
-        self.errors.push(total);
-        let of_error = before.is_some_and(|before| (total / before - 1.0).abs() < tolerance);
-        let of_mean = mean_before.is_some_and(|before| (mean(&self.errors) / before - 1.0).abs() < tolerance);
-        of_error || of_densities < tolerance || of_bandwidths < tolerance || of_mean
-    }
 }

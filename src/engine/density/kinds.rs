@@ -47,7 +47,7 @@ pub struct Adaptive {
     pub weighing: Weighing,
     /// Bounds of all bandwidths, m.
     pub bounds: Option<[f64; 2]>,
-    /// Wide kernels are summed on coarse cells.
+    /// Wide kernels are summed on coarse cells, and the iteration begins there.
     pub is_fast: bool,
     /// Relative change of a loop that ends the iteration; zero for never.
     pub tolerance: f64,
@@ -138,7 +138,8 @@ pub struct Estimate {
     pub standard_error: Vec<f64>,
     /// By cell with particles, in the order of the tally.
     pub cells: Vec<Cell>,
-    /// Mean bandwidth over cells with particles after each loop, m, that of the start first.
+    /// Mean bandwidth over cells with particles after each loop, m, that of the start first; loops on coarser cells come before
+    /// those on the cells themselves.
     pub history: Vec<f64>,
     /// Whether the last loop changed less than the tolerance.
     pub is_settled: bool,

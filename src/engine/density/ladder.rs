@@ -25,16 +25,23 @@ struct Rung {
 
 /// A smoothed field.
 pub struct Ladder {
-    /// As it was.
-    pub field: Field,
+    /// As it was, if widths are asked for that are read there.
+    pub field: Option<Field>,
     first: usize,
     rungs: Vec<Rung>,
     /// The width of rung zero, m.
     narrowest: f64,
 }
 
-/// What a cell reads of a ladder.
+/// What a cell reads of a rung.
 type Nodes = [([usize; 3], [f64; 3]); AXES];
+
+/// What a cell reads of a ladder for a width: of two rungs, and where between them.
+pub struct Reading {
+    below: usize,
+    nodes: [Nodes; 2],
+    t: f64,
+}
 
 impl Ladder {
     /// A field on fine cells of a window, smoothed by widths that enclose a range, m.
@@ -75,37 +82,46 @@ impl Ladder {
             }
             rungs.push(Rung { level, factors, field: smoothed });
         }
+        let field = (least < narrowest || rungs.len() < 2).then_some(field);
         Self { field, first, rungs, narrowest }
     }
 
     /// Whether sums with a width are read here.
     pub fn has(&self, deviation: f64) -> bool {
-        deviation >= self.narrowest && self.rungs.len() > 1
+        self.field.is_none() || (deviation >= self.narrowest && self.rungs.len() > 1)
     }
 
-    /// The field at a cell, for a width within the range.
+    /// What a cell reads for a width within the range; the same on all ladders of one window and range.
     ///
     /// - Equation: `ln F` as a line in `1/σ²` between two rungs.
     /// - Symbols: `F` smoothed field.
     /// - Range: of one sign; else F itself is the line.
     /// - Source: where all is even F hangs on no width, and far from all that there is `ln F` goes as `−r²/2σ²`.
-    /// - Shape: one value.
-    pub fn read(&self, lattice: &Lattice, cell: [usize; AXES], deviation: f64) -> f64 {
-        let ([narrow, wide], t) = self.between(lattice, cell, deviation);
-        blended(narrow, wide, t)
-    }
-
-    /// The field at a cell on the two rungs that enclose a width, and where between them it is read.
-    pub fn between(&self, lattice: &Lattice, cell: [usize; AXES], deviation: f64) -> ([f64; 2], f64) {
+    /// - Shape: from 1 at the narrower rung to ½ at the wider one.
+    #[inline(always)]
+    pub fn reading(&self, lattice: &Lattice, cell: [usize; AXES], deviation: f64) -> Reading {
         let place = 2.0 * ln((deviation / self.narrowest).max(1.0)) / std::f64::consts::LN_2;
         let below = (place as usize).clamp(self.first, self.first + self.rungs.len() - 2) - self.first;
         let [low, high] = [&self.rungs[below], &self.rungs[below + 1]];
         let at_low = low.nodes(lattice, cell);
         let at_high = if low.level == high.level { at_low } else { high.nodes(lattice, cell) };
-        let (narrow, wide) = (read(&low.field, &at_low), read(&high.field, &at_high));
         let ratio = self.narrowest * power(below + self.first) / deviation;
-        // From 1 at the narrower one to ½ at the wider one.
-        ([narrow, wide], (2.0 * (1.0 - ratio * ratio)).clamp(0.0, 1.0))
+        Reading { below, nodes: [at_low, at_high], t: (2.0 * (1.0 - ratio * ratio)).clamp(0.0, 1.0) }
+    }
+
+    /// The field on the two rungs of a reading, and where between them it is read.
+    #[inline(always)]
+    pub fn between(&self, reading: &Reading) -> ([f64; 2], f64) {
+        let [low, high] = &reading.nodes;
+        let rung = |k: usize| &self.rungs[reading.below + k].field;
+        ([read(rung(0), low), read(rung(1), high)], reading.t)
+    }
+
+    /// The field there.
+    #[inline(always)]
+    pub fn read(&self, reading: &Reading) -> f64 {
+        let ([narrow, wide], t) = self.between(reading);
+        blended(narrow, wide, t)
     }
 }
 

@@ -152,6 +152,20 @@ impl Field {
         ((x - self.first[0]) * self.cells[1] + (y - self.first[1])) * self.cells[2]
     }
 
+    /// All cells of a lattice of so many: zeros beyond the window.
+    pub fn whole(&self, cells: [usize; AXES]) -> Vec<f64> {
+        let mut whole = vec![0.0; cells.iter().product::<usize>() + PADDING];
+        let n = self.cells[2];
+        for x in 0..self.cells[0] {
+            for y in 0..self.cells[1] {
+                let from = (x * self.cells[1] + y) * n;
+                let to = ((x + self.first[0]) * cells[1] + y + self.first[1]) * cells[2] + self.first[2];
+                whole[to..to + n].copy_from_slice(&self.values[from..from + n]);
+            }
+        }
+        whole
+    }
+
     /// Means over the cells of the next level, along one axis after the other. The last ones may be narrower.
     pub fn coarsened(&self, window: &Window, cells: [usize; AXES], factors: [[usize; AXES]; 2]) -> Self {
         let target = Self::zeros(window, factors[1]);
@@ -173,9 +187,23 @@ impl Field {
         let outer: usize = self.cells[..axis].iter().product();
         // Fine cells of a cell, of which the last one may have less.
         let width = |cell: usize, factor: usize| (n_fine - cell * factor).min(factor) as f64;
+        let share = |cell: usize| {
+            let at = cell + self.first[axis];
+            width(at, factor) / width(at / 2, 2 * factor)
+        };
+        if inner == 1 {
+            let shares: Vec<f64> = (0..self.cells[axis]).map(share).collect();
+            let rows = self.values.chunks_exact(self.cells[axis]).take(outer);
+            for (row, halved) in rows.zip(halved.values.chunks_exact_mut(n)) {
+                for (cell, (value, share)) in row.iter().zip(&shares).enumerate() {
+                    halved[(cell + self.first[axis]) / 2 - first] += share * value;
+                }
+            }
+            return halved;
+        }
         for cell in 0..self.cells[axis] {
             let at = (cell + self.first[axis]) / 2;
-            let share = width(cell + self.first[axis], factor) / width(at, 2 * factor);
+            let share = share(cell);
             for block in 0..outer {
                 let from = (block * self.cells[axis] + cell) * inner;
                 let to = (block * n + at - first) * inner;

@@ -53,4 +53,12 @@ impl Limits {
         limits.curvature[1] = limits.curvature[1].max(limits.curvature[0]);
         limits
     }
+
+    /// The same, with kernels within bounds of others too, which come first.
+    pub fn within(mut self, others: &Self) -> Self {
+        for (own, [low, high]) in self.kernel.iter_mut().zip(others.kernel) {
+            *own = own.map(|bound| bound.clamp(low, high));
+        }
+        self
+    }
 }

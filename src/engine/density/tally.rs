@@ -114,6 +114,29 @@ impl Tally {
         Self { moments, ..self.clone() }
     }
 
+    /// The same on other cells, of which there are so many: `places` says which of them each cell with particles is a part of.
+    /// Also, for each, the position of that one among those with particles.
+    pub fn joined(&self, places: &[u32], n_cells: usize) -> (Self, Vec<u32>) {
+        let mut sums = vec![[0.0; 3]; n_cells];
+        for (idx, &place) in places.iter().enumerate() {
+            let own = &mut sums[place as usize];
+            own[0] += self.counts[idx];
+            own[1] += self.masses[idx];
+            own[2] += self.squares[idx];
+        }
+        let (largest, outside, moments) = (self.largest, self.outside, self.moments);
+        let mut joined = Self { largest, outside, moments, ..Self::default() };
+        let mut positions = vec![0; n_cells];
+        for (cell, [count, mass, square]) in sums.into_iter().enumerate().filter(|(_, sums)| sums[2] != 0.0) {
+            positions[cell] = joined.cells.len() as u32;
+            joined.cells.push(cell as u32);
+            joined.counts.push(count);
+            joined.masses.push(mass);
+            joined.squares.push(square);
+        }
+        (joined, places.iter().map(|&place| positions[place as usize]).collect())
+    }
+
     pub fn mass(&self) -> f64 {
         self.masses.iter().sum()
     }
