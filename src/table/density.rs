@@ -13,8 +13,8 @@ use std::sync::Arc;
 /// Key of the notes in the file's metadata.
 const KEY: &str = "lamella_density";
 
-/// Rows that are put together at once.
-const ROWS: usize = 122_880;
+/// Rows that are put together at once: few, so that their memory is used again.
+const ROWS: usize = 8192;
 
 /// What is known of a cell beside its density.
 #[derive(Debug, Clone, PartialEq)]

@@ -45,8 +45,6 @@ pub(super) struct Search<'a> {
     pub(super) per_mass: f64,
     pub(super) d: f64,
     pub(super) constants: Constants,
-    /// Whether it began with kernels that are nearly right.
-    is_near: bool,
 }
 
 /// The density of particles that are counted on a lattice.
@@ -116,7 +114,6 @@ pub(super) fn iterate<'a>(
         per_mass: 1.0,
         d: lattice.d as f64,
         constants,
-        is_near: false,
     };
     if search.counts.iter().any(|count| !(count.is_finite() && *count > 0.0)) {
         return (search, None);
@@ -124,16 +121,15 @@ pub(super) fn iterate<'a>(
     let mut ends = Ends::default();
     search.begin(tally, bases);
     let coarser = search.take_coarser(tally, bases);
-    search.is_near = coarser.is_some();
     if coarser.is_some() {
         ends.errors.push(search.error());
     }
     if !search.cells.is_empty() {
         search.spread();
     }
-    let (mut history, is_settled_coarser) = coarser.unwrap_or((vec![search.mean_bandwidth()], false));
     // Coarser cells that resolve all kernels say as much of them as these do.
-    let mut is_settled = is_settled_coarser && search.is_resolved();
+    let mut is_settled = coarser.is_some() && search.is_resolved();
+    let mut history = coarser.unwrap_or_else(|| vec![search.mean_bandwidth()]);
     let n_loops = if is_settled || search.cells.is_empty() { 0 } else { adaptive.most_loops };
     for _ in 0..n_loops {
         let old: Vec<Before> = search.cells.iter().map(Before::of).collect();
@@ -231,14 +227,7 @@ impl Search<'_> {
         } else {
             self.average(tools);
         }
-        let is_damped = self.is_near;
-        self.for_all(&|search, cell, _| {
-            let old = (cell.h, cell.s);
-            search.choose(cell);
-            if is_damped {
-                search.damp(cell, old);
-            }
-        });
+        self.for_all(&|search, cell, _| search.choose(cell));
         self.fill_smooth();
         self.spread();
     }

@@ -116,12 +116,4 @@ impl Search<'_> {
             others *= cell.s[axis];
         }
     }
-
-    /// Size and shape half-way between those of two loops, as they swing around what they come to.
-    pub(super) fn damp(&self, cell: &mut Cell, (h, s): (f64, [f64; AXES])) {
-        if cell.h > 0.0 {
-            cell.h = (cell.h * h).sqrt();
-            self.lattice.axes().for_each(|axis| cell.s[axis] = (cell.s[axis] * s[axis]).sqrt());
-        }
-    }
 }

@@ -4,7 +4,7 @@
 //! the fine cells: where kernels are narrow for coarser ones, they loop until they are settled themselves.
 
 use super::adaptive::{Search, iterate};
-use super::kinds::{Cell, Start};
+use super::kinds::{Adaptive, Cell, Start};
 use super::lattice::{AXES, End, Lattice};
 use super::limits::Limits;
 use super::local::Basis;
@@ -13,6 +13,10 @@ use super::tally::Tally;
 /// Bandwidths over edges of cells, from which on cells twice as long say as much of them: on a line densities do not hang on
 /// cells up to twice a bandwidth long (methods, table P3-a).
 const RESOLVED: f64 = 1.2;
+
+/// Loops on coarser cells, at most: what does not settle soon begins anew on its own cells, as where a density jumps loops go on
+/// without an end, and away from it.
+const MOST_LOOPS: usize = 8;
 
 /// Cells of an axis, at least, that are put together by two.
 const SHORTEST: usize = 32;
@@ -72,19 +76,21 @@ impl Search<'_> {
         adaptive.is_fast && adaptive.tolerance > 0.0 && adaptive.start == Start::NormalReference
     }
 
-    /// Takes kernels that are found on cells twice as long, if these serve; tells how, and whether they are settled.
+    /// Takes kernels that are found on cells twice as long, if these serve and they are settled there; tells how.
     pub(super) fn take_coarser(
         &mut self,
         tally: &Tally,
         bases: Option<&Vec<(Basis, bool)>>,
-    ) -> Option<(Vec<f64>, bool)> {
+    ) -> Option<Vec<f64>> {
         let h = self.cells.first().map_or(0.0, |cell| cell.h);
         let coarser = self.begins_coarser().then(|| Coarser::of(self.lattice, tally, h)).flatten()?;
         let own = bases.map(|bases| coarser.bases(bases));
         let limits = Limits::new(&coarser.lattice).within(&self.limits);
+        let adaptive =
+            Adaptive { most_loops: self.adaptive.most_loops.min(MOST_LOOPS), ..self.adaptive.clone() };
         let (found, history) =
-            iterate((&coarser.lattice, &coarser.tally), (self.adaptive, limits), own.as_ref(), self.width);
-        let (mut history, is_settled) = history?;
+            iterate((&coarser.lattice, &coarser.tally), (&adaptive, limits), own.as_ref(), self.width);
+        let mut history = history.and_then(|(history, is_settled)| is_settled.then_some(history))?;
         let mut parents = found.cells;
         for parent in &mut parents {
             parent.sigma = parent.sigma.clamp(self.limits.support[0], self.limits.support[1]);
@@ -98,7 +104,7 @@ impl Search<'_> {
         if let Some(last) = history.last_mut() {
             *last = self.mean_bandwidth();
         }
-        Some((history, is_settled))
+        Some(history)
     }
 
     /// Whether cells twice as long resolve all kernels.

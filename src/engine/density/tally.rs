@@ -39,7 +39,6 @@ pub enum Weighing {
 impl Tally {
     /// Counts particles with a position per axis of the lattice, from a corner on, and a mass each.
     pub fn of(lattice: &Lattice, low: &[f64], positions: &[&[f64]], masses: Option<&[f64]>) -> Self {
-        let n = positions.first().map_or(0, |axis| axis.len());
         let mut of_cells = vec![[0.0; 3]; lattice.n_cells()];
         let largest =
             masses.map_or(1.0, |masses| masses.iter().fold(0.0, |largest: f64, &own| largest.max(own)));
@@ -49,13 +48,14 @@ impl Tally {
             positions.iter().zip(low).map(|(x, low)| x.first().copied().unwrap_or(*low)).collect();
         let origins: Vec<f64> =
             origins.iter().zip(low).map(|(x, low)| if x.is_finite() { *x } else { *low }).collect();
-        for idx in 0..n {
+        let places = places(lattice, low, positions);
+        for (idx, &cell) in places.iter().enumerate() {
             let mass = masses.map_or(1.0, |masses| masses[idx]);
-            let Some(cell) = cell_of(lattice, low, positions, idx) else {
+            if cell == OUTSIDE {
                 tally.outside.0 += 1;
                 tally.outside.1 += mass;
                 continue;
-            };
+            }
             // Squares of the masses themselves might be beyond all numbers.
             let share = if largest > 0.0 { mass / largest } else { 0.0 };
             for ((axis, x), origin) in lattice.axes().zip(positions).zip(&origins) {
@@ -63,7 +63,7 @@ impl Tally {
                 tally.moments[axis][0] += share * x;
                 tally.moments[axis][1] += share * x * x;
             }
-            let sums = &mut of_cells[cell];
+            let sums = &mut of_cells[cell as usize];
             sums[0] += 1.0;
             sums[1] += mass;
             sums[2] += share * share;
@@ -88,9 +88,8 @@ impl Tally {
         values: &[&[f64]],
     ) -> Vec<[f64; AXES]> {
         let mut sums = vec![[0.0; AXES + 1]; self.cells.len()];
-        for idx in 0..positions.first().map_or(0, |axis| axis.len()) {
-            let cell = cell_of(lattice, low, positions, idx);
-            let at = cell.and_then(|cell| self.cells.binary_search(&(cell as u32)).ok());
+        for (idx, cell) in places(lattice, low, positions).into_iter().enumerate() {
+            let at = self.cells.binary_search(&cell).ok().filter(|_| cell != OUTSIDE);
             let Some(at) = at.filter(|_| values.iter().all(|own| own[idx].is_finite())) else { continue };
             let share = masses.map_or(1.0, |masses| masses[idx] / self.largest);
             for (axis, own) in lattice.axes().zip(values) {
@@ -173,15 +172,21 @@ impl Tally {
     }
 }
 
-/// The cell of a particle, if it is inside.
-fn cell_of(lattice: &Lattice, low: &[f64], positions: &[&[f64]], idx: usize) -> Option<usize> {
-    let (mut cell, mut is_inside) = (0, true);
+/// In place of the cell of a particle that is not inside; there are fewer cells.
+const OUTSIDE: u32 = u32::MAX;
+
+/// The cells of particles, axis by axis.
+fn places(lattice: &Lattice, low: &[f64], positions: &[&[f64]]) -> Vec<u32> {
+    let mut places = vec![0; positions.first().map_or(0, |axis| axis.len())];
     for ((axis, x), low) in lattice.axes().zip(positions).zip(low) {
-        let place = (x[idx] - low) / lattice.edge[axis];
-        let n = lattice.cells[axis];
-        // What is on the upper end is inside.
-        is_inside &= place >= 0.0 && place <= n as f64;
-        cell = cell * n + (place.max(0.0) as usize).min(n - 1);
+        let (edge, cells) = (lattice.edge[axis], lattice.cells[axis]);
+        let (most, n, last) = (cells as f64, cells as u32, cells as u32 - 1);
+        for (cell, x) in places.iter_mut().zip(*x) {
+            let place = (x - low) / edge;
+            // What is on the upper end is inside.
+            let is_inside = place >= 0.0 && place <= most && *cell != OUTSIDE;
+            *cell = if is_inside { cell.wrapping_mul(n) + (place as u32).min(last) } else { OUTSIDE };
+        }
     }
-    is_inside.then_some(cell)
+    places
 }
