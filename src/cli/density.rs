@@ -8,8 +8,8 @@ use super::{CommandResult, Exit, Stopped, Terminal};
 use clap::ValueEnum;
 use lamella::diagnostic::{Diagnostic, codes};
 use lamella::engine::density::{
-    Adaptive, Cell, End, Estimate, Lattice, Rule, Shape, Start, Tally, Variant, Weighing, estimate, global,
-    histogram,
+    Adaptive, Cell, End, Estimate, Lattice, Order, Rule, Shape, Start, Tally, Variant, Weighing, estimate,
+    global, histogram,
 };
 use lamella::maths::wide::Width;
 use lamella::table::{DensityCell, DensityTable, write_density};
@@ -69,6 +69,10 @@ pub(crate) struct Arguments {
     /// What counts where weights differ
     #[arg(long, value_enum, default_value_t = WeighingName::All)]
     weighing: WeighingName,
+    /// Of which power of bandwidths the bias is: 2, or 4, by wider kernels whose sum is put right by the points; less wrong where the
+    /// density is smooth
+    #[arg(long, value_name = "2|4", default_value_t = 2, value_parser = order)]
+    order: u8,
     /// Relative change of a loop that ends the iteration
     #[arg(long, value_name = "X", default_value_t = 0.02)]
     tolerance: f64,
@@ -159,6 +163,10 @@ impl Axis {
     }
 }
 
+fn order(text: &str) -> Result<u8, String> {
+    text.parse().ok().filter(|order| [2, 4].contains(order)).ok_or_else(|| "2 or 4".to_owned())
+}
+
 pub(crate) fn run(arguments: &Arguments, terminal: &Terminal) -> CommandResult {
     let start = Instant::now();
     check(arguments)?;
@@ -229,6 +237,10 @@ fn check(arguments: &Arguments) -> Result<(), Stopped> {
     }
     if let Some((_, name)) = idle.iter().find(|(is_given, _)| *is_given && !differ) {
         return Err(wrong(&format!("{name} is for kernels that differ from place to place")));
+    }
+    if arguments.order == 4 && (!differ || arguments.parity || arguments.ends.iter().any(Ends::holds)) {
+        let message = "--order 4 is for --kernel adaptive and round, without --parity and ends that hold";
+        return Err(wrong(message));
     }
     if !differ && arguments.ends.iter().any(Ends::holds) {
         return Err(wrong("--ends hold is for kernels that differ from place to place"));
@@ -330,6 +342,7 @@ fn adaptive(arguments: &Arguments, factor: f64) -> Adaptive {
             WeighingName::Number => Weighing::Number,
             WeighingName::Cell => Weighing::OfCell,
         },
+        order: if arguments.order == 4 { Order::Fourth } else { Order::Second },
         bounds: arguments.bandwidth.as_ref().map(|own| {
             let factor = own.unit.as_ref().map_or(factor, |(_, unit)| unit.factor());
             [own.low * factor, own.high * factor]

@@ -3,7 +3,7 @@
 //! Owns these lines of `lamella plan`. May use the plan. It deliberately decides nothing.
 
 use super::Plan;
-use super::kernels::Reacting;
+use super::kernels::{FOURTH, Reacting};
 use crate::diagnostic::number;
 
 /// How concentrations are found of particles that carry mass.
@@ -28,6 +28,11 @@ pub(super) fn lines(plan: &Plan) -> Vec<String> {
     if kernels.is_oriented {
         lines.push(
             "densities that are shown: kernels along the flow; those that react lie along the axes".into(),
+        );
+    }
+    if kernels.order == FOURTH {
+        lines.push(
+            "densities that are shown: of the fourth order, by kernels 1.6 times as wide, put right by the particles".into(),
         );
     }
     match kernels.reacting {

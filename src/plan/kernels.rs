@@ -9,7 +9,7 @@ use super::tape::{Binary, Operation, Register, Tape};
 use super::transport::Transport;
 use super::{Axis, InstantReaction, Output, Plan, Quantity, shares};
 use crate::scenario::estimation::Estimation;
-pub use crate::scenario::estimation::{Manner, Reacting, Rule, Weighing};
+pub use crate::scenario::estimation::{FOURTH, Manner, Reacting, Rule, Weighing};
 use crate::scenario::transport::Shares;
 use crate::scenario::{OutputKind, Rate, Scenario};
 use serde::{Deserialize, Serialize};
@@ -29,6 +29,8 @@ pub struct Kernels {
     pub is_stretched: bool,
     /// Kernels lie along the flow.
     pub is_oriented: bool,
+    /// Of which power of bandwidths the bias of densities is that are shown: 2 or 4.
+    pub order: u8,
     pub rule: Rule,
     pub weighing: Weighing,
     /// Relative change of a loop that ends the search for bandwidths, and most loops.
@@ -94,6 +96,7 @@ fn kernels(scenario: &Scenario, axes: &[Axis], reacts: bool) -> Option<Kernels> 
         bandwidth: written.bandwidth.as_ref().map(|bandwidth| bandwidth.value),
         is_stretched: written.is_stretched,
         is_oriented: written.is_oriented,
+        order: written.order,
         rule: written.rule,
         weighing: written.weighing,
         tolerance: written.tolerance,

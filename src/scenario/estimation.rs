@@ -18,6 +18,10 @@ const MOST_LOOPS: f64 = 1000.0;
 /// Steps from one search for bandwidths to the next.
 const MOST_STEPS: f64 = 1e9;
 
+/// Orders of densities.
+pub const SECOND: u8 = 2;
+pub const FOURTH: u8 = 4;
+
 /// How densities are found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -99,6 +103,7 @@ enum Word {
     Correct,
     Shape,
     Orient,
+    Order,
     Rule,
     Weighing,
     Tolerance,
@@ -114,6 +119,7 @@ const WORDS: &[(&str, Word)] = &[
     ("correct", Word::Correct),
     ("shape", Word::Shape),
     ("orient", Word::Orient),
+    ("order", Word::Order),
     ("rule", Word::Rule),
     ("weighing", Word::Weighing),
     ("tolerance", Word::Tolerance),
@@ -132,7 +138,7 @@ impl Word {
             Self::Grid | Self::Reactions => true,
             Self::Bandwidth | Self::Correct => is_gaussian,
             Self::Shape | Self::Weighing | Self::Refresh | Self::Narrowing => is_found,
-            Self::Orient | Self::Tolerance | Self::Loops => manner == Manner::Adaptive,
+            Self::Orient | Self::Order | Self::Tolerance | Self::Loops => manner == Manner::Adaptive,
             Self::Rule => manner == Manner::Global,
         }
     }
@@ -150,6 +156,8 @@ pub struct Estimation {
     pub is_stretched: bool,
     /// Kernels lie along the flow.
     pub is_oriented: bool,
+    /// Of which power of bandwidths the bias of densities is that are shown: 2 or 4.
+    pub order: u8,
     pub rule: Rule,
     pub weighing: Weighing,
     pub tolerance: f64,
@@ -169,6 +177,7 @@ impl Estimation {
             cells: None,
             is_stretched: true,
             is_oriented: false,
+            order: SECOND,
             rule: Rule::PlugIn,
             weighing: Weighing::OfAll,
             tolerance: 0.02,
@@ -294,6 +303,13 @@ fn set<'a>(
         Word::Orient => {
             found.is_oriented =
                 choice(checker, entry, "a direction of kernels", &[("flow", true), ("axes", false)])?;
+        }
+        Word::Order => {
+            let what = "the order of densities";
+            let value = number(checker, entry, what)?;
+            let is_fine = [SECOND, FOURTH].map(f64::from).contains(&value.value);
+            checker.require(is_fine, what, precise(value.value), "2 or 4", value.span)?;
+            found.order = value.value as u8;
         }
         Word::Rule => found.rule = choice(checker, entry, "a rule for one bandwidth", RULES)?,
         Word::Weighing => found.weighing = choice(checker, entry, "a weighing of masses", WEIGHINGS)?,

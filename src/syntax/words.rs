@@ -104,6 +104,7 @@ pub fn clause_words(keyword: &str) -> &'static [&'static str] {
             "correct",
             "shape",
             "orient",
+            "order",
             "rule",
             "weighing",
             "tolerance",

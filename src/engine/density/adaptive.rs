@@ -10,7 +10,7 @@ use super::curvature::{Curvatures, curvatures};
 use super::frame::Frame;
 use super::global::histogram;
 use super::held::{Held, turned_over};
-use super::kinds::{Adaptive, Cell, Estimate, Start};
+use super::kinds::{Adaptive, Cell, Estimate, Order, Start};
 use super::lattice::{AXES, End, Field, Lattice, Window};
 use super::limits::{GROWTH, Limits};
 use super::local::Basis;
@@ -320,7 +320,12 @@ impl Search<'_> {
     }
 
     /// `ρ = Σ_b c_b W_b/V_c` on a window, or `Σ_b c_b W_b²/V_c²`.
-    fn density_of(&self, (counts, per_mass): (&[f64], f64), window: &Window, is_squared: bool) -> Field {
+    pub(super) fn density_of(
+        &self,
+        (counts, per_mass): (&[f64], f64),
+        window: &Window,
+        is_squared: bool,
+    ) -> Field {
         if self.is_oriented {
             return self.density_along((counts, per_mass), window, is_squared);
         }
@@ -414,27 +419,31 @@ impl Search<'_> {
         })
     }
 
-    fn finish(self, tally: &Tally, unit: f64, (history, is_settled): (Vec<f64>, bool)) -> Estimate {
+    fn finish(mut self, tally: &Tally, unit: f64, (history, is_settled): (Vec<f64>, bool)) -> Estimate {
         let all = Window { first: [0; AXES], end: self.lattice.cells };
-        let (counts, unit, per_mass) = match self.adaptive.weighing {
-            Weighing::OfAll | Weighing::Mean => (&self.counts, unit, self.per_mass),
-            Weighing::Number | Weighing::OfCell => (&tally.masses, 1.0, 1.0),
-        };
+        let is_of_all = matches!(self.adaptive.weighing, Weighing::OfAll | Weighing::Mean);
         let n = self.lattice.n_cells();
         let (mut density, mut standard_error) = (vec![0.0; n], vec![0.0; n]);
         if !self.cells.is_empty() {
-            let is_there = matches!(self.adaptive.weighing, Weighing::OfAll | Weighing::Mean);
-            density = if is_there && !self.is_oriented {
-                self.rho.1.whole(self.lattice.cells)
+            let unit = if is_of_all { unit } else { 1.0 };
+            let counts = if is_of_all { self.counts.clone() } else { tally.masses.clone() };
+            let per_mass = if is_of_all { self.per_mass } else { 1.0 };
+            if self.adaptive.order == Order::Fourth && self.held.is_none() {
+                let [of_masses, of_squares] = self.fourth((&counts, &tally.squares), &all);
+                (density, standard_error) = (of_masses.values, of_squares.values);
             } else {
-                self.density_of((counts, per_mass), &all, false).values
-            };
+                density = if is_of_all && !self.is_oriented {
+                    self.rho.1.whole(self.lattice.cells)
+                } else {
+                    self.density_of((&counts, per_mass), &all, false).values
+                };
+                standard_error = self.density_of((&tally.squares, 0.0), &all, true).values;
+            }
             density.truncate(n);
             density.iter_mut().for_each(|value| *value *= unit);
             if self.held.is_some() || self.is_oriented {
                 density.iter_mut().for_each(|value| *value = value.max(0.0));
             }
-            standard_error = self.density_of((&tally.squares, 0.0), &all, true).values;
             standard_error.truncate(n);
             standard_error.iter_mut().for_each(|value| *value = tally.largest * value.sqrt());
         }

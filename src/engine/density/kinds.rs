@@ -24,6 +24,16 @@ pub enum Shape {
     Round,
 }
 
+/// Of which power of a bandwidth the bias is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Order {
+    /// Every particle has its kernel.
+    #[default]
+    Second,
+    /// Kernels are wider, and what they are wrong by is put right; no walls that hold a value.
+    Fourth,
+}
+
 /// The bandwidths of the first loop.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Start {
@@ -45,6 +55,7 @@ pub struct Adaptive {
     /// Which way kernels are stretched; along the axes of the lattice if they are round, or as in the released program.
     pub orientation: Orientation,
     pub weighing: Weighing,
+    pub order: Order,
     /// Bounds of all bandwidths, m.
     pub bounds: Option<[f64; 2]>,
     /// Wide kernels are summed on coarse cells, and the iteration begins there.
@@ -74,6 +85,7 @@ impl Default for Adaptive {
             start: Start::default(),
             orientation: Orientation::default(),
             weighing: Weighing::default(),
+            order: Order::default(),
             bounds: None,
             is_fast: true,
             tolerance: 0.02,

@@ -11,6 +11,7 @@ mod coarser;
 mod curvature;
 mod direct;
 mod ellipse;
+mod fourth;
 mod frame;
 mod global;
 mod held;
@@ -33,7 +34,7 @@ mod taps;
 
 pub use adaptive::estimate;
 pub use global::{Global, Rule, Trouble, global, histogram};
-pub use kinds::{Adaptive, Cell, Estimate, Shape, Start, Variant};
+pub use kinds::{Adaptive, Cell, Estimate, Order, Shape, Start, Variant};
 pub use lattice::{End, Lattice};
 pub use local::Orientation;
 pub use projection::Projection;

@@ -4,8 +4,8 @@
 //! nothing.
 
 use super::super::density::{
-    Adaptive, Cell, End, Global, Lattice, Orientation, Projection, Shape, Tally, Variant, estimate, global,
-    histogram,
+    Adaptive, Cell, End, Global, Lattice, Order, Orientation, Projection, Shape, Tally, Variant, estimate,
+    global, histogram,
 };
 use super::super::density::{Rule as DensityRule, Weighing as DensityWeighing};
 use super::super::error::RunError;
@@ -14,7 +14,7 @@ use super::flock::Flock;
 use super::world::Site;
 use crate::maths::vector::pow;
 use crate::maths::wide::Width;
-use crate::plan::kernels::{Kernels, Manner, Rule, Weighing};
+use crate::plan::kernels::{FOURTH, Kernels, Manner, Rule, Weighing};
 use crate::plan::transport::SideRule;
 
 /// Particles that a kernel should hold which reacts.
@@ -29,6 +29,7 @@ pub struct Finder {
     width: Width,
     /// Of the flow, by cell of the lattice, if kernels follow it.
     directions: Option<Vec<[f64; 3]>>,
+    order: Order,
 }
 
 /// Kernels, and the density that they give.
@@ -54,11 +55,14 @@ impl Finder {
         };
         let axes: Vec<(usize, f64, [End; 2])> = (0..D).map(axis).collect();
         let lattice = Lattice::new(&axes).ok_or_else(|| unsound("cells of kernels that are none"))?;
-        Ok(Self { lattice, low: site.low.to_vec(), kernels, width, directions: None })
+        Ok(Self { lattice, low: site.low.to_vec(), kernels, width, directions: None, order: Order::Second })
     }
 
-    /// The same with kernels along the flow of a time, where the plan says so.
-    pub fn along_flow<const D: usize>(mut self, site: &Site<D>, t: f64) -> Self {
+    /// The same for densities that are shown at a time: with kernels along the flow and of the order that the plan says.
+    pub fn shown<const D: usize>(mut self, site: &Site<D>, t: f64) -> Self {
+        if self.kernels.order == FOURTH {
+            self.order = Order::Fourth;
+        }
         if self.kernels.is_oriented && D > 1 {
             let (first, flows) = (self.lattice.axes().start, site.transport.flows());
             let direction = |cell: usize| {
@@ -113,6 +117,7 @@ impl Finder {
             orientation: self.orientation(&tally),
             start: start.map_or_else(Default::default, super::super::density::Start::Bandwidth),
             weighing: weighing(kernels.weighing),
+            order: self.order,
             bounds: kernels.bandwidth,
             is_fast: true,
             tolerance: kernels.tolerance,
