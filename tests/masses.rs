@@ -384,3 +384,31 @@ fn kernels_along_the_flow_map_a_plume_best() {
     tell(&format!("along the flow, along axes, one, counted: {errors:.4?}"));
     assert!(errors[0] < 0.92 * errors[1] && errors[1] < 0.92 * errors[2] && errors[0] < 0.75 * errors[3]);
 }
+
+/// A line between two concentrations that are held: the density that is shown has their slope up to the sides.
+#[test]
+fn densities_know_sides_that_are_held() {
+    let text = "lamella 1
+title \"A line between two concentrations\"
+species A
+domain line x = 0 m .. 1 m
+medium porosity 0.4
+dispersion 1e-3 m^2/s
+initial A = 1 mol/m^3 * (1 - 0.75 * x / (1 m))
+boundary left concentration A = 1 mol/m^3
+boundary right concentration A = 0.25 mol/m^3
+particles mass 20_000
+kernel gaussian adaptive { grid 5 mm }
+run to 100 s, step 1 s
+output profile A at t = 100 s on 200
+reference exact for A = 1 mol/m^3 * (1 - 0.75 * x / (1 m))
+measure low = l2(profile.A - exact) / l2(exact) over x = 0 m .. 0.05 m
+measure high = l2(profile.A - exact) / l2(exact) over x = 0.95 m .. 1 m
+";
+    for seed in 1..4 {
+        let finished = with(text, &[], seed);
+        let [low, high] = ["low", "high"].map(|name| finished.measure(name));
+        tell(&format!("held sides: {low:.2e}, {high:.2e}"));
+        assert!(low < 0.01 && high < 0.03, "{low} {high}");
+    }
+}

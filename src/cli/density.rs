@@ -238,8 +238,9 @@ fn check(arguments: &Arguments) -> Result<(), Stopped> {
     if let Some((_, name)) = idle.iter().find(|(is_given, _)| *is_given && !differ) {
         return Err(wrong(&format!("{name} is for kernels that differ from place to place")));
     }
-    if arguments.order == 4 && (!differ || arguments.parity || arguments.ends.iter().any(Ends::holds)) {
-        let message = "--order 4 is for --kernel adaptive and round, without --parity and ends that hold";
+    if arguments.order == 4 && (!differ || arguments.parity || arguments.ends.iter().any(Ends::is_odd)) {
+        let message =
+            "--order 4 is for --kernel adaptive and round, without --parity and ends that absorb or hold";
         return Err(wrong(message));
     }
     if !differ && arguments.ends.iter().any(Ends::holds) {
@@ -382,6 +383,7 @@ fn tabulate(
         "exact": arguments.exact || arguments.parity,
         "parity": arguments.parity,
         "kernel": arguments.kernel.word(),
+        "order": arguments.order,
         "tolerance": arguments.tolerance,
         "loops": found.history.len() - 1,
         "settled": found.is_settled,

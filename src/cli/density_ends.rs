@@ -42,6 +42,11 @@ impl Ends {
         self.words.iter().any(|word| matches!(word, Word::Hold(..)))
     }
 
+    /// Whether kernels are mirrored with the other sign at one of them.
+    pub(super) fn is_odd(&self) -> bool {
+        self.holds() || self.words.iter().any(|word| matches!(word, Word::Plain(End::Sink)))
+    }
+
     /// As the engine takes them; densities are weights per length, area or volume.
     pub(super) fn of(&self, points: &Points, d: usize) -> Result<[End; 2], Stopped> {
         let [low, high] = &self.words;

@@ -32,7 +32,7 @@ pub(super) fn lines(plan: &Plan) -> Vec<String> {
     }
     if kernels.order == FOURTH {
         lines.push(
-            "densities that are shown: of the fourth order, by kernels 1.6 times as wide, put right by the particles".into(),
+            "densities that are shown: of the fourth order, by kernels 1.6 times as wide, put right by the particles; of the second where a side absorbs or holds a concentration".into(),
         );
     }
     match kernels.reacting {

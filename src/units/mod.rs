@@ -114,7 +114,7 @@ impl Unit {
             return scaled(digits.parse().ok()?);
         }
         let (mantissa, exponent) = match digits.split_once(['e', 'E']) {
-            Some((mantissa, exponent)) => (mantissa, exponent.parse::<i64>().unwrap_or(i64::from(i32::MAX))),
+            Some((mantissa, exponent)) => (mantissa, whole(exponent)?),
             None => (digits, 0),
         };
         let exponent = exponent.saturating_add(i64::from(self.decimal));
@@ -125,6 +125,15 @@ impl Unit {
     pub fn factor(&self) -> f64 {
         self.to_si("1").unwrap_or(f64::NAN)
     }
+}
+
+/// A whole number as far as it matters for an exponent.
+fn whole(digits: &str) -> Option<i64> {
+    let most = i64::from(i32::MAX);
+    let bare = digits.strip_prefix(['+', '-']).unwrap_or(digits);
+    let is_whole = !bare.is_empty() && bare.bytes().all(|c| c.is_ascii_digit());
+    let beyond = if digits.starts_with('-') { -most } else { most };
+    is_whole.then(|| digits.parse().unwrap_or(beyond).clamp(-most, most))
 }
 
 /// The word at `start`, which is no unit: up to the next joint or power.

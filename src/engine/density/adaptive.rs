@@ -130,7 +130,8 @@ pub(super) fn iterate<'a>(
     // Coarser cells that resolve all kernels say as much of them as these do.
     let mut is_settled = coarser.is_some() && search.is_resolved();
     let mut history = coarser.unwrap_or_else(|| vec![search.mean_bandwidth()]);
-    let n_loops = if is_settled || search.cells.is_empty() { 0 } else { adaptive.most_loops };
+    let left = adaptive.most_loops.saturating_sub(history.len() - 1);
+    let n_loops = if is_settled || search.cells.is_empty() { 0 } else { left };
     for _ in 0..n_loops {
         let old: Vec<Before> = search.cells.iter().map(Before::of).collect();
         search.go_on();
@@ -428,7 +429,8 @@ impl Search<'_> {
             let unit = if is_of_all { unit } else { 1.0 };
             let counts = if is_of_all { self.counts.clone() } else { tally.masses.clone() };
             let per_mass = if is_of_all { self.per_mass } else { 1.0 };
-            if self.adaptive.order == Order::Fourth && self.held.is_none() {
+            let is_even = !self.lattice.ends.as_flattened().iter().any(|end| end.is_odd());
+            if self.adaptive.order == Order::Fourth && is_even {
                 let [of_masses, of_squares] = self.fourth((&counts, &tally.squares), &all);
                 (density, standard_error) = (of_masses.values, of_squares.values);
             } else {

@@ -15,7 +15,6 @@ use std::f64::consts::PI;
 const DOMINANT: f64 = 0.85;
 
 /// Logarithms of what is the same for all cells.
-#[derive(Clone)]
 pub(super) struct Constants {
     pub(super) support: f64,
     pub(super) curvature: f64,

@@ -35,17 +35,17 @@ impl Coarser {
     /// The lattice of cells twice as long, if kernels of a bandwidth are still half as wide as one of them, and what is in it.
     pub(super) fn of(lattice: &Lattice, tally: &Tally, bandwidth: f64) -> Option<Self> {
         let is_fit = |axis: usize| {
-            let is_ring = lattice.ends[axis].contains(&End::Wrap);
             let is_held = lattice.ends[axis].iter().any(|end| matches!(end, End::Held(_)));
             let n = lattice.cells[axis];
-            n >= SHORTEST && !(is_ring && n % 2 == 1) && !is_held && bandwidth >= lattice.edge[axis]
+            // Half a cell beyond an end would look like a density that falls there.
+            n >= SHORTEST && n % 2 == 0 && !is_held && bandwidth >= lattice.edge[axis]
         };
         if tally.cells.len() < FEWEST || !lattice.axes().all(is_fit) {
             return None;
         }
         let mut coarse = lattice.clone();
         for axis in lattice.axes() {
-            coarse.cells[axis] = lattice.cells[axis].div_ceil(2);
+            coarse.cells[axis] = lattice.cells[axis] / 2;
             coarse.edge[axis] *= 2.0;
         }
         let place = |&idx: &u32| {

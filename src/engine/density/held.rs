@@ -56,10 +56,7 @@ impl Held {
         while let Some(cell) = next.pop_front() {
             let owner = owners[place(cell)];
             for axis in lattice.axes() {
-                let at = cell[axis];
-                for other in
-                    [at.wrapping_sub(1), at + 1].into_iter().filter(|other| *other < lattice.cells[axis])
-                {
+                for other in lattice.beside(cell[axis], axis) {
                     let mut cell = cell;
                     cell[axis] = other;
                     if owners[place(cell)] == u32::MAX {

@@ -30,7 +30,7 @@ pub enum Order {
     /// Every particle has its kernel.
     #[default]
     Second,
-    /// Kernels are wider, and what they are wrong by is put right; no walls that hold a value.
+    /// Kernels are wider, and what they are wrong by is put right; of the second order beside ends that absorb or hold a value.
     Fourth,
 }
 

@@ -73,6 +73,15 @@ impl Lattice {
         AXES - self.d..AXES
     }
 
+    /// The places beside one along an axis; of a periodic one the first and the last are beside each other.
+    pub fn beside(&self, at: usize, axis: usize) -> impl Iterator<Item = usize> + use<> {
+        let n = self.cells[axis];
+        let is_ring = self.ends[axis].contains(&End::Wrap);
+        let below = at.checked_sub(1).or(is_ring.then_some(n - 1));
+        let above = (at + 1 < n).then_some(at + 1).or(is_ring.then_some(0));
+        below.into_iter().chain(above)
+    }
+
     /// Volume of a cell, m^d.
     pub fn volume(&self) -> f64 {
         self.edge.iter().product()

@@ -263,13 +263,9 @@ fn fill_nearest(lattice: &Lattice, known: &[usize], classes: &mut [Vec<i16>; AXE
     while let Some(cell) = queue.pop_front() {
         let at = lattice.cell(cell as usize);
         for axis in lattice.axes() {
-            for is_up in [false, true] {
+            for beside in lattice.beside(at[axis], axis) {
                 let mut next = at;
-                match is_up {
-                    true if at[axis] + 1 < lattice.cells[axis] => next[axis] += 1,
-                    false if at[axis] > 0 => next[axis] -= 1,
-                    _ => continue,
-                }
+                next[axis] = beside;
                 let other = index(lattice, next);
                 if !std::mem::replace(&mut is_known[other], true) {
                     lattice.axes().for_each(|axis| classes[axis][other] = classes[axis][cell as usize]);
@@ -310,6 +306,18 @@ mod tests {
             is_settled: true,
         };
         Projection::of_estimate(lattice.clone(), &estimate, |_| 1.0, Width::widest())
+    }
+
+    /// Of two kernels the nearest one, which may be nearest around a ring.
+    #[test]
+    fn kernels_of_empty_cells_are_those_of_the_nearest_one() {
+        for (ends, last) in [([End::Mirror; 2], 7), ([End::Wrap; 2], 5)] {
+            let lattice = Lattice::new(&[(20, 1.0, ends)]).unwrap();
+            let mut classes: [Vec<i16>; AXES] = std::array::from_fn(|_| vec![0; 20]);
+            (classes[2][1], classes[2][12]) = (5, 7);
+            fill_nearest(&lattice, &[1, 12], &mut classes);
+            assert_eq!((classes[2][0], classes[2][6], classes[2][8], classes[2][19]), (5, 5, 7, last));
+        }
     }
 
     #[test]

@@ -24,7 +24,7 @@ impl<const D: usize> Scene<'_, D> {
 
     fn find(&self, population: usize) -> Result<&(Finder, Found), RunError> {
         let find = || {
-            let finder = Finder::new(self.site, population, self.width)?.shown(self.site, self.t);
+            let finder = Finder::new(self.site, population, self.width)?.shown(self.site, population, self.t);
             let flocks: Vec<&Flock<D>> =
                 self.flocks.iter().filter(|flock| flock.population == population).collect();
             let found = finder.find(&flocks, self.units.row(population), None)?;

@@ -20,6 +20,9 @@ use crate::plan::transport::SideRule;
 /// Particles that a kernel should hold which reacts.
 const FEWEST: f64 = 4.0;
 
+/// By so much of itself what is the same along a side may differ.
+const EVEN: f64 = 1e-9;
+
 /// Where and how kernels of one population are found.
 #[derive(Debug, Clone)]
 pub struct Finder {
@@ -59,9 +62,12 @@ impl Finder {
     }
 
     /// The same for densities that are shown at a time: with kernels along the flow and of the order that the plan says.
-    pub fn shown<const D: usize>(mut self, site: &Site<D>, t: f64) -> Self {
+    pub fn shown<const D: usize>(mut self, site: &Site<D>, population: usize, t: f64) -> Self {
         if self.kernels.order == FOURTH {
             self.order = Order::Fourth;
+        }
+        if self.kernels.manner == Manner::Adaptive {
+            self.hold(site, population, t);
         }
         if self.kernels.is_oriented && D > 1 {
             let (first, flows) = (self.lattice.axes().start, site.transport.flows());
@@ -78,6 +84,44 @@ impl Finder {
             self.directions = Some((0..self.lattice.n_cells()).map(direction).collect());
         }
         self
+    }
+
+    /// Ends that hold a density: sides where a concentration is held, the same all along.
+    ///
+    /// - Equation: `ρ_w = φ R c`.
+    /// - Symbols: `φ` porosity beside the side, `R` retardation, `c` its concentration at the time.
+    /// - Range: sides of one patch; where c or φ differ along it the end is a mirror.
+    /// - Source: methods, section 4.7.
+    /// - Shape: one value per end, mass per m^d.
+    fn hold<const D: usize>(&mut self, site: &Site<D>, population: usize, t: f64) {
+        let of = &site.transport.populations[population];
+        let first = self.lattice.axes().start;
+        for axis in (0..D).filter(|_| of.is_mobile) {
+            for (end, wall) in [site.low[axis], site.high[axis]].into_iter().enumerate() {
+                let [patch] = &site.transport.sides[axis][end][..] else { continue };
+                let SideRule::Held(tapes) = &patch.rule else { continue };
+                let Some(tape) = tapes.get(of.species) else { continue };
+                let beside = if end == 0 { 0 } else { self.lattice.cells[first + axis] - 1 };
+                let place = |cell: usize| {
+                    let at = self.lattice.cell(cell);
+                    let centre = |other: usize| {
+                        self.low[other] + (at[first + other] as f64 + 0.5) * self.lattice.edge[first + other]
+                    };
+                    let own = |other: usize| if other == axis { wall } else { centre(other) };
+                    (at[first + axis] == beside).then(|| std::array::from_fn(own))
+                };
+                let places: Vec<[f64; D]> = (0..self.lattice.n_cells()).filter_map(place).collect();
+                let concentrations = site.evaluate(tape, &places, t);
+                let water = site.porosity(&places);
+                let densities =
+                    concentrations.iter().zip(&water).map(|(c, water)| of.retardation * c * water);
+                let (least, most) =
+                    densities.fold((f64::INFINITY, 0.0_f64), |(a, b), own| (a.min(own), b.max(own)));
+                if least >= 0.0 && most.is_finite() && most - least <= EVEN * most {
+                    self.lattice.ends[first + axis][end] = End::Held(most);
+                }
+            }
+        }
     }
 
     /// Kernels of particles where they are.

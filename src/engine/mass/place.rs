@@ -65,61 +65,21 @@ pub struct Faces<const D: usize> {
 /// Cells that an initial concentration is looked at in, in all.
 const MOST_CELLS: f64 = 1_048_576.0;
 
-/// Those of a line on which it is smooth, and by how much neighbours may differ there.
-const ON_A_LINE: usize = 131_072;
-const SMOOTH: f64 = 0.05;
-
-/// Of the largest mass of a cell, what does not matter.
-const NOTHING: f64 = 1e-12;
-
-/// Whether neighbours have nearly the same.
-fn is_smooth(masses: &[f64]) -> bool {
-    let nothing = NOTHING * masses.iter().fold(0.0_f64, |most, own| most.max(own.abs()));
-    masses.windows(2).all(|pair| {
-        let most = pair[0].abs().max(pair[1].abs());
-        (pair[0] - pair[1]).abs() <= SMOOTH * most || most <= nothing
-    })
-}
-
 impl<const D: usize> Cells<D> {
     /// Cells over a domain. `mass` gives the masses per volume at a list of centres.
-    ///
-    /// - Equation: `M(x) = Σ m_i V`, a line in each cell.
-    /// - Symbols: `m_i` mass per volume at centres, `V` volume of a cell.
-    /// - Range: a million cells in all; an eighth of them along a line where what neighbours have differs by 5 % at most: there
-    ///   both the mass and the places are right to 1e-7 of a peak.
-    /// - Source: midpoint rule, rest `w²/24 m″`.
-    /// - Shape: rises from 0 to all of the mass.
     pub fn new(low: [f64; D], high: [f64; D], mass: impl Fn(&[[f64; D]]) -> Vec<f64>) -> Self {
-        if D == 1 {
-            let (cells, masses) = Self::on([ON_A_LINE; D], (low, high), &mass);
-            if is_smooth(&masses) {
-                return cells;
-            }
-        }
-        Self::on(shape(low, high), (low, high), &mass).0
-    }
-
-    fn on(
-        n: [usize; D],
-        (low, high): ([f64; D], [f64; D]),
-        mass: &dyn Fn(&[[f64; D]]) -> Vec<f64>,
-    ) -> (Self, Vec<f64>) {
+        let n = shape(low, high);
         let width: [f64; D] = std::array::from_fn(|axis| (high[axis] - low[axis]) / n[axis] as f64);
         let volume: f64 = width.iter().product();
         let n_cells: usize = n.iter().product();
         let mut cells = Self { low, width, n, masses: Running::new(Vec::new()) };
-        let (mut sums, mut masses) = (Vec::with_capacity(n_cells), Vec::new());
+        let mut sums = Vec::with_capacity(n_cells);
         // A million roundings would show in the total: what each of them loses is kept.
         let (mut sum, mut lost) = (0.0_f64, 0.0_f64);
         for first in (0..n_cells).step_by(4096) {
             let centres: Vec<[f64; D]> =
                 (first..(first + 4096).min(n_cells)).map(|cell| cells.inside(cell, [0.5; D])).collect();
-            let own = mass(&centres);
-            if n_cells == ON_A_LINE {
-                masses.extend_from_slice(&own);
-            }
-            for mass in own {
+            for mass in mass(&centres) {
                 let term = mass * volume - lost;
                 let next = sum + term;
                 lost = (next - sum) - term;
@@ -128,7 +88,7 @@ impl<const D: usize> Cells<D> {
             }
         }
         cells.masses = Running::new(sums);
-        (cells, masses)
+        cells
     }
 
     pub fn total(&self) -> f64 {
