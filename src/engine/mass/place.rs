@@ -114,8 +114,12 @@ impl<const D: usize> Cells<D> {
         let mut rest = cell;
         let mut place = [0.0; D];
         for axis in (0..D).rev() {
-            place[axis] = self.low[axis] + ((rest % self.n[axis]) as f64 + fraction[axis]) * self.width[axis];
-            rest /= self.n[axis];
+            // What is left for the first axis is its own cell; divisions are slow.
+            let own = if axis == 0 { rest } else { rest % self.n[axis] };
+            place[axis] = self.low[axis] + (own as f64 + fraction[axis]) * self.width[axis];
+            if axis > 0 {
+                rest /= self.n[axis];
+            }
         }
         place
     }
