@@ -38,7 +38,7 @@ impl Coarser {
             let is_held = lattice.ends[axis].iter().any(|end| matches!(end, End::Held(_)));
             let n = lattice.cells[axis];
             // Half a cell beyond an end would look like a density that falls there.
-            n >= SHORTEST && n % 2 == 0 && !is_held && bandwidth >= lattice.edge[axis]
+            n >= SHORTEST && n.is_multiple_of(2) && !is_held && bandwidth >= lattice.edge[axis]
         };
         if tally.cells.len() < FEWEST || !lattice.axes().all(is_fit) {
             return None;
