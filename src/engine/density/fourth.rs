@@ -16,7 +16,8 @@ impl Search<'_> {
     ///
     /// - Equation: `ρ = f Σ_b (m_b/f_b) W_b/V`, `f = Σ_b m_b W_b/V`, times what keeps the mass of each cloud apart.
     /// - Symbols: `m_b` mass in cell b, `f_b` what f is there, `W` kernels, 1.6 times as wide as best for f.
-    /// - Range: no ends that turn signs over, where wider kernels lose more; above zero; what f has too little of at a peak, particles have more of than f says, so that the bias is of h⁴.
+    /// - Range: no ends that turn signs over, where wider kernels lose more; above zero; what f has too little of at a peak,
+    ///   particles have more of than f says, so that the bias is of h⁴.
     /// - Source: M. C. Jones, O. Linton, J. P. Nielsen 1995: A simple bias reduction method for density estimation, Biometrika 82,
     ///   327, doi:10.1093/biomet/82.2.327; all of the mass stays, but not with each particle.
     /// - Shape: the standard error is that of the kernel `2W − W∗W`, `√(4 − 4 (2/3)^{d/2} + 2^{−d/2})` times that of W.
