@@ -431,7 +431,7 @@ impl Search<'_> {
             let per_mass = if is_of_all { self.per_mass } else { 1.0 };
             let is_even = !self.lattice.ends.as_flattened().iter().any(|end| end.is_odd());
             if self.adaptive.order == Order::Fourth && is_even {
-                let [of_masses, of_squares] = self.fourth((&counts, &tally.squares), &all);
+                let [of_masses, of_squares] = self.fourth((&counts, &tally.squares));
                 (density, standard_error) = (of_masses.values, of_squares.values);
             } else {
                 density = if is_of_all && !self.is_oriented {

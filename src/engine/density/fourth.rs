@@ -21,7 +21,8 @@ impl Search<'_> {
     /// - Source: M. C. Jones, O. Linton, J. P. Nielsen 1995: A simple bias reduction method for density estimation, Biometrika 82,
     ///   327, doi:10.1093/biomet/82.2.327; all of the mass stays, but not with each particle.
     /// - Shape: the standard error is that of the kernel `2W − W∗W`, `√(4 − 4 (2/3)^{d/2} + 2^{−d/2})` times that of W.
-    pub(super) fn fourth(&mut self, (counts, squares): (&[f64], &[f64]), window: &Window) -> [Field; 2] {
+    pub(super) fn fourth(&mut self, (counts, squares): (&[f64], &[f64])) -> [Field; 2] {
+        let window = &Window { first: [0; AXES], end: self.lattice.cells };
         let mut cells = std::mem::take(&mut self.cells);
         for cell in &mut cells {
             let wanted = cell.s.map(|s| WIDER * cell.h * s);
@@ -32,7 +33,7 @@ impl Search<'_> {
         let mut variance = self.density_of((squares, 0.0), window, true);
         let ratio = |(cell, count): (&Cell, &f64)| {
             let [x, y, z] = cell.at;
-            let own = density.values[density.row(x, y) + z - density.first[2]];
+            let own = density.values[density.row(x, y) + z];
             if own > 0.0 { count / own } else { 0.0 }
         };
         let ratios: Vec<f64> = self.cells.iter().zip(counts).map(ratio).collect();

@@ -72,11 +72,7 @@ impl Finder {
         if self.kernels.is_oriented && D > 1 {
             let (first, flows) = (self.lattice.axes().start, site.transport.flows());
             let direction = |cell: usize| {
-                let at = self.lattice.cell(cell);
-                let place: [f64; D] = std::array::from_fn(|axis| {
-                    site.low[axis] + (at[first + axis] as f64 + 0.5) * self.lattice.edge[first + axis]
-                });
-                let own = site.velocity(&flows, &place, t);
+                let own = site.velocity(&flows, &self.centre(cell), t);
                 let mut all = [0.0; 3];
                 all[first..].copy_from_slice(&own);
                 all
@@ -84,6 +80,13 @@ impl Finder {
             self.directions = Some((0..self.lattice.n_cells()).map(direction).collect());
         }
         self
+    }
+
+    fn centre<const D: usize>(&self, cell: usize) -> [f64; D] {
+        let (at, first) = (self.lattice.cell(cell), self.lattice.axes().start);
+        std::array::from_fn(|axis| {
+            self.low[axis] + (at[first + axis] as f64 + 0.5) * self.lattice.edge[first + axis]
+        })
     }
 
     /// Ends that hold a density: sides where a concentration is held, the same all along.
@@ -103,12 +106,9 @@ impl Finder {
                 let Some(tape) = tapes.get(of.species) else { continue };
                 let beside = if end == 0 { 0 } else { self.lattice.cells[first + axis] - 1 };
                 let place = |cell: usize| {
-                    let at = self.lattice.cell(cell);
-                    let centre = |other: usize| {
-                        self.low[other] + (at[first + other] as f64 + 0.5) * self.lattice.edge[first + other]
-                    };
-                    let own = |other: usize| if other == axis { wall } else { centre(other) };
-                    (at[first + axis] == beside).then(|| std::array::from_fn(own))
+                    let mut place: [f64; D] = self.centre(cell);
+                    place[axis] = wall;
+                    (self.lattice.cell(cell)[first + axis] == beside).then_some(place)
                 };
                 let places: Vec<[f64; D]> = (0..self.lattice.n_cells()).filter_map(place).collect();
                 let concentrations = site.evaluate(tape, &places, t);
