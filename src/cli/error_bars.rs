@@ -6,7 +6,7 @@ use super::text::{duration, significant};
 use super::{Exit, Stopped, Terminal};
 use lamella::diagnostic::{Diagnostic, codes};
 use lamella::engine::snapshot::Snapshot;
-use lamella::engine::{self, RunError};
+use lamella::engine::{self, RunError, Starts};
 use lamella::estimate::{self, Advice, Trials};
 use lamella::flow::FlowSeries;
 use lamella::plan::Plan;
@@ -45,6 +45,7 @@ impl ErrorBars {
         let cost = trials.cost(plan);
         terminal.remark(&format!("error bars: {} trials, {cost:.1} times the run", trials.trials.len()));
         let mut of_trials = Vec::new();
+        let starts = Starts::default();
         for trial in &trials.trials {
             let progress = Progress::new(terminal, trial.plan.particles.count, trial.plan.time.n_steps);
             let watch = Watch { progress, interrupt: watch.interrupt };
@@ -52,6 +53,7 @@ impl ErrorBars {
                 threads: Some(n_threads),
                 takes_half_draws: trial.takes_half_draws,
                 flow: flow_of(&trial.plan).map_err(|error| run_failed(&error, scenario, plan))?,
+                starts: Some(starts.clone()),
                 ..engine::Settings::default()
             };
             let mut seen = Vec::new();

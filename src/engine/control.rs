@@ -1,8 +1,9 @@
 //! How a caller follows and stops a run.
 //!
-//! Owns the settings and the line to the caller. May use `flow`. It deliberately
+//! Owns the settings and the line to the caller. May use `flow` and what starts are. It deliberately
 //! prints nothing.
 
+use super::mass::Starts;
 use crate::flow::FlowSeries;
 
 /// How a plan is run: threads and vector instructions change no byte of the results, half draws do.
@@ -21,6 +22,8 @@ pub struct Settings {
     pub most_pair_bytes: Option<usize>,
     /// The flows of the plan, one after another, where they have to be solved or read.
     pub flow: Option<FlowSeries>,
+    /// Initial concentrations that other runs of the program may have integrated; `None` integrates them anew.
+    pub starts: Option<Starts>,
 }
 
 /// Progress and Ctrl-C, asked once per step.

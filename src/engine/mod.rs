@@ -35,6 +35,7 @@ mod water;
 use crate::plan::Plan;
 pub use control::{Control, Settings, Unattended};
 pub use error::RunError;
+pub use mass::Starts;
 use snapshot::{Outcome, Snapshot};
 
 /// Runs a plan and hands every snapshot to `sink`: those of one output in the order of time, those of one time in

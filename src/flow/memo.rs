@@ -3,10 +3,17 @@
 //! Owns who works an answer out and how many are kept. May use nothing of the crate. It deliberately keeps nothing
 //! beyond the life of the program.
 
+use serde::Serialize;
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// What an answer is known by.
 pub type Key = [u8; 32];
+
+/// BLAKE3 of everything that an answer follows from.
+pub fn key(of: &impl Serialize) -> Key {
+    let text = serde_json::to_string(of).expect("plans are described by finite numbers, lists and names");
+    *blake3::hash(text.as_bytes()).as_bytes()
+}
 
 /// Answers by their keys, the one asked for last at the end.
 #[derive(Debug)]

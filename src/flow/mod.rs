@@ -9,7 +9,7 @@ pub mod cache;
 pub mod cells;
 pub mod darcy;
 pub mod files;
-mod memo;
+pub mod memo;
 mod packages;
 pub mod random_field;
 pub mod read;

@@ -5,7 +5,7 @@
 
 use super::build::{self, FlowError};
 use super::files::{self, Loaded, Setting, Trouble};
-use super::memo::{Key, Memo};
+use super::memo::{Key, Memo, key};
 use super::read::window::Extent;
 use super::read::{Kind, ReadError};
 use super::{FaceFlow, FlowSeries, Sink, cache};
@@ -13,7 +13,6 @@ use crate::plan::tape::Tape;
 use crate::plan::transport::{Flow, FlowFile};
 use crate::plan::{NUMERICS_VERSION, Plan};
 use crate::source::Sources;
-use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
@@ -133,12 +132,6 @@ fn extents(plan: &Plan) -> Vec<Extent> {
 
 fn missing(file: usize) -> Trouble {
     Trouble { file, error: ReadError::new(Kind::Missing, "the bytes of the file are not there") }
-}
-
-/// BLAKE3 of everything that a flow follows from.
-fn key(of: &impl Serialize) -> Key {
-    let text = serde_json::to_string(of).expect("flows are described by finite numbers, lists and names");
-    *blake3::hash(text.as_bytes()).as_bytes()
 }
 
 fn size(flow: &FaceFlow) -> usize {

@@ -5,7 +5,7 @@
 //! too wide, never too narrow.
 
 use super::operator::{Binary, Unary};
-use super::scalar;
+use super::{scalar, vector};
 
 /// All numbers from `low` to `high`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -71,7 +71,7 @@ impl Interval {
             Unary::Not => Self::of_truth(a.truth().map(|truth| !truth)),
             Unary::Abs if a.low >= 0.0 => a,
             Unary::Abs => Self::new(0.0, a.high.max(-a.low)),
-            Unary::Exp => Self::new(scalar::exp(a.low).max(0.0), scalar::exp(a.high)),
+            Unary::Exp => Self::new(vector::exp(a.low).max(0.0), vector::exp(a.high)),
             Unary::Sqrt if a.low >= 0.0 => rising(f64::sqrt),
             Unary::Ln if a.low > 0.0 => rising(scalar::ln),
             Unary::Log10 if a.low > 0.0 => rising(scalar::log10),

@@ -3,7 +3,7 @@
 //! One definition serves constant folding in the scenario and evaluation in tapes, so that a
 //! constant and a column give the same bits.
 
-use super::scalar;
+use super::{scalar, vector};
 use serde::{Deserialize, Serialize};
 
 /// Operators of one argument. Logic takes and gives 1 and 0.
@@ -32,7 +32,7 @@ impl Unary {
             Unary::Not => truth(a == 0.0),
             Unary::Abs => a.abs(),
             Unary::Sqrt => a.sqrt(),
-            Unary::Exp => scalar::exp(a),
+            Unary::Exp => vector::exp(a),
             Unary::Ln => scalar::ln(a),
             Unary::Log10 => scalar::log10(a),
             Unary::Sin => scalar::sin(a),

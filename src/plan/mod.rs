@@ -64,7 +64,7 @@ use tape::Tape;
 use transport::Transport;
 
 /// Version of everything that decides bytes: stages, formulas, streams. Part of the plan hash.
-pub const NUMERICS_VERSION: u32 = 2;
+pub const NUMERICS_VERSION: u32 = 3;
 
 /// A whole run, frozen. Lengths in m, times in s, concentrations in mol/m³ or kg/m³.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -62,6 +62,7 @@ impl Task<'_> {
             Some(refusal) => Err(refusal),
             None => self.flow().and_then(|flow| {
                 settings.flow = flow;
+                settings.starts = Some(self.scene.starts.clone());
                 engine::run(&self.plan, &settings, control, &mut sink)
             }),
         };

@@ -6,6 +6,7 @@
 use super::Key;
 use super::seed::seed;
 use crate::diagnostic::Diagnostic;
+use crate::engine::Starts;
 use crate::flow::Flows;
 use crate::flow::scene::attach;
 use crate::plan::Plan;
@@ -27,6 +28,8 @@ pub struct Scene {
     pub sweep: Sweep,
     /// Flows that points share.
     pub flows: Flows,
+    /// Integrated initial concentrations that points share.
+    pub starts: Starts,
     root_seed: u64,
 }
 
@@ -48,7 +51,16 @@ impl Scene {
         sweep: Sweep,
     ) -> Self {
         let root_seed = settings.seed.or(sweep.seed).unwrap_or(scenario.seed);
-        Self { file, sources, settings, options, sweep, flows: Flows::default(), root_seed }
+        Self {
+            file,
+            sources,
+            settings,
+            options,
+            sweep,
+            flows: Flows::default(),
+            starts: Starts::default(),
+            root_seed,
+        }
     }
 
     pub fn root_seed(&self) -> u64 {

@@ -342,11 +342,11 @@ impl Search<'_> {
         let tables: Vec<Option<Table>> = (0..AXES).map(|axis| self.table(axis, fill)).collect();
         scatter((self.cells.len(), self.width), &mut fields, &|idx, spread| {
             let cell = &self.cells[idx];
-            spread.weight = counts[idx] / if is_squared { volume * volume } else { volume };
+            *spread.weight = counts[idx] / if is_squared { volume * volume } else { volume };
             for (axis, lent) in spread.taps[0].iter_mut().enumerate() {
                 let line = Line::of(lattice, axis, 1);
                 if axis + lattice.d < AXES {
-                    lent.own.be_one();
+                    lent.be_one();
                     continue;
                 }
                 let own = cell.h * cell.s[axis] / lattice.edge[axis];
@@ -382,8 +382,8 @@ impl Search<'_> {
                 scatter((sources.len(), self.width), &mut fields, &|idx, spread| {
                     let ((at, owner), line) = (sources[idx], |axis| Line::of(lattice, axis, 1));
                     let cell = &self.cells[owner];
-                    spread.weight = 1.0;
-                    spread.taps[0][..AXES - lattice.d].iter_mut().for_each(|lent| lent.own.be_one());
+                    *spread.weight = 1.0;
+                    spread.taps[0][..AXES - lattice.d].iter_mut().for_each(|lent| lent.be_one());
                     for axis in lattice.axes() {
                         let own = cell.h * cell.s[axis] / lattice.edge[axis];
                         let side = (is_behind && axis == wall.axis).then_some(wall.side);

@@ -69,7 +69,7 @@ pub fn curvatures(
     let kernels = Kernels::new((lattice, integral), (variant, is_fast), narrow_cells);
     scatter((narrow.len(), width), &mut fields, &|at, spread| {
         let idx = narrow[at];
-        spread.weight = counts[idx] / lattice.volume();
+        *spread.weight = counts[idx] / lattice.volume();
         for along in first..AXES {
             kernels.lend(&cells[idx], along, &mut spread.taps[along - first]);
         }
@@ -78,7 +78,7 @@ pub fn curvatures(
         let sources = held.0.before(lattice, *wall, more[wall.axis]);
         scatter((sources.len(), width), &mut fields, &|idx, spread| {
             let (at, owner) = sources[idx];
-            spread.weight = 2.0 * wall.value * held.1;
+            *spread.weight = 2.0 * wall.value * held.1;
             for along in first..AXES {
                 kernels.turn_over(&cells[owner], along, (at, wall), &mut spread.taps[along - first]);
             }
@@ -153,7 +153,7 @@ impl<'a> Kernels<'a> {
     /// The derivative along an axis of the kernel of a cell.
     fn lend<'t>(&'t self, cell: &Cell, along: usize, taps: &mut [Lent<'t>; AXES]) {
         let lattice = self.lattice;
-        taps[..AXES - lattice.d].iter_mut().for_each(|lent| lent.own.be_one());
+        taps[..AXES - lattice.d].iter_mut().for_each(|lent| lent.be_one());
         for axis in lattice.axes() {
             let line = Line::of(lattice, axis, 1);
             let (own, b) = (cell.g[along] / lattice.edge[axis], cell.at[axis]);
@@ -176,7 +176,7 @@ impl Kernels<'_> {
         taps: &mut [Lent; AXES],
     ) {
         let lattice = self.lattice;
-        taps[..AXES - lattice.d].iter_mut().for_each(|lent| lent.own.be_one());
+        taps[..AXES - lattice.d].iter_mut().for_each(|lent| lent.be_one());
         for axis in lattice.axes() {
             let place = (at[axis], (axis == wall.axis).then_some(wall.side));
             let fill: Fill = &|line, own, b, taps| self.work_out((along, axis), (line, own), b, taps);

@@ -188,7 +188,7 @@ impl Projection {
         let all = Window { first: [0; AXES], end: self.lattice.cells };
         let mut fields = [Field::zeros(&all, [1; AXES])];
         scatter((cells.len(), self.width), &mut fields, &|idx, spread| {
-            spread.weight = masses[idx];
+            *spread.weight = masses[idx];
             self.lend(cells[idx], (classes, tables), &mut spread.taps[0]);
         });
         let [mut field] = fields;
@@ -205,7 +205,7 @@ impl Projection {
         let at = self.lattice.cell(cell as usize);
         for (axis, lent) in taps.iter_mut().enumerate() {
             match &tables[axis] {
-                None => lent.own.be_one(),
+                None => lent.be_one(),
                 Some(table) => {
                     let class = i64::from(classes[axis][cell as usize]);
                     table.lend(Line::of(&self.lattice, axis, 1), class, at[axis], lent, FILL);

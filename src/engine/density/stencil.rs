@@ -20,11 +20,10 @@ const SLABS: usize = 8;
 /// Lanes of a sum.
 const LANES: usize = 4;
 
-/// What sources spread: for each field, along each axis.
-#[derive(Default)]
-pub struct Spread<'t> {
-    pub weight: f64,
-    pub taps: Vec<[Lent<'t>; AXES]>,
+/// What a source spreads: for each field, along each axis.
+pub struct Spread<'s, 't> {
+    pub weight: &'s mut f64,
+    pub taps: &'s mut [[Lent<'t>; AXES]],
 }
 
 /// Taps that are worked out once for many sources, or for one.
@@ -36,6 +35,12 @@ pub struct Lent<'t> {
 }
 
 impl Lent<'_> {
+    /// Those of an axis that is not used.
+    pub fn be_one(&mut self) {
+        self.first = 0;
+        self.shared = Some(&[1.0]);
+    }
+
     #[inline(always)]
     fn first(&self) -> usize {
         if self.shared.is_some() { self.first } else { self.own.first }
@@ -58,24 +63,26 @@ impl Lent<'_> {
 pub fn scatter<'t>(
     (n, width): (usize, Width),
     fields: &mut [Field],
-    of: &(dyn Fn(usize, &mut Spread<'t>) + Sync),
+    of: &(dyn Fn(usize, Spread<'_, 't>) + Sync),
 ) {
-    let mut spreads: Vec<Spread<'t>> = Vec::new();
-    spreads.resize_with(n.min(TOGETHER), Spread::default);
+    let (n_fields, n_most) = (fields.len(), n.min(TOGETHER));
+    let mut weights = vec![0.0; n_most];
+    let mut taps: Vec<[Lent<'t>; AXES]> = Vec::new();
+    taps.resize_with(n_most * n_fields, Default::default);
     for first in (0..n).step_by(TOGETHER) {
         let n_own = TOGETHER.min(n - first);
-        let mut portions: Vec<&mut [Spread<'t>]> = spreads[..n_own].chunks_mut(PORTION).collect();
-        parallel::for_each(&mut portions, &|portion, own| {
-            for (at, spread) in own.iter_mut().enumerate() {
-                spread.taps.resize_with(fields.len(), Default::default);
-                of(first + portion * PORTION + at, spread);
+        let of_sources = taps[..n_own * n_fields].chunks_mut(PORTION * n_fields);
+        let mut portions: Vec<_> = weights[..n_own].chunks_mut(PORTION).zip(of_sources).collect();
+        parallel::for_each(&mut portions, &|portion, (weights, taps)| {
+            for (at, (weight, taps)) in weights.iter_mut().zip(taps.chunks_mut(n_fields)).enumerate() {
+                of(first + portion * PORTION + at, Spread { weight, taps });
             }
         });
-        let spreads = &spreads[..n_own];
+        let (weights, taps) = (&weights[..n_own], &taps[..n_own * n_fields]);
         for (idx, field) in fields.iter_mut().enumerate() {
             let mut slabs = slabs_of(field);
             parallel::for_each(&mut slabs, &|_, slab| {
-                width.run(Adding { slab, spreads, idx });
+                width.run(Adding { slab, weights, taps, idx });
             });
         }
     }
@@ -113,7 +120,9 @@ pub(super) fn slabs_of(field: &mut Field) -> Vec<Slab<'_>> {
 
 struct Adding<'a, 'f, 't> {
     slab: &'a mut Slab<'f>,
-    spreads: &'a [Spread<'t>],
+    weights: &'a [f64],
+    /// Of all fields, by source.
+    taps: &'a [[Lent<'t>; AXES]],
     idx: usize,
 }
 
@@ -122,8 +131,9 @@ impl pulp::NullaryFnOnce for Adding<'_, '_, '_> {
 
     #[inline(always)]
     fn call(self) {
-        for spread in self.spreads {
-            add(self.slab, &spread.taps[self.idx], spread.weight);
+        let n_fields = self.taps.len() / self.weights.len();
+        for source in 0..self.weights.len() {
+            add(self.slab, &self.taps[source * n_fields + self.idx], self.weights[source]);
         }
     }
 }

@@ -143,6 +143,11 @@ impl Line {
         }
     }
 
+    /// Whether a kernel reaches no end, on fine cells.
+    fn is_inside(self, centre: f64, reach: f64) -> bool {
+        self.factor == 1 && centre - reach >= 0.0 && centre + reach <= self.n as f64
+    }
+
     /// Room for all images.
     fn clear(self, centre: f64, reach: f64, taps: &mut Taps) {
         let (mut first, mut end) = self.within(centre, reach);
@@ -177,9 +182,18 @@ impl Line {
             return self.fill_evenly(1.0 / self.n as f64, taps);
         }
         let reach = (REACH * width).ceil() + 0.5;
-        self.clear(centre, reach, taps);
         let per = 1.0 / deviation;
         let norm = 0.5 / integral.at(reach * per);
+        if self.is_inside(centre, reach) {
+            let mut below = integral.at(-0.5 * per);
+            return even(centre, reach, taps, |z| {
+                let above = integral.at((z + 0.5) * per);
+                let value = norm * (above - below);
+                below = above;
+                value
+            });
+        }
+        self.clear(centre, reach, taps);
         for (centre, sign) in self.images(centre, reach) {
             let (first, end) = self.within(centre, reach);
             let start = ((first * self.factor) as f64).max(centre - reach);
@@ -196,6 +210,9 @@ impl Line {
     /// What the centres of the cells of the level have of something that is even, in cell `b`.
     pub fn sample(self, b: usize, reach: f64, value: &dyn Fn(f64) -> f64, taps: &mut Taps) {
         let centre = b as f64 + 0.5;
+        if self.is_inside(centre, reach) {
+            return even(centre, reach, taps, value);
+        }
         self.clear(centre, reach, taps);
         for (centre, sign) in self.images(centre, reach) {
             let (first, end) = self.within(centre, reach);
@@ -207,6 +224,19 @@ impl Line {
                 }
             }
         }
+    }
+}
+
+/// What is even, in the middle of a fine cell: worked out from there on, and turned over.
+#[inline(always)]
+fn even(centre: f64, reach: f64, taps: &mut Taps, value: impl FnMut(f64) -> f64) {
+    let n_beside = (reach - 0.5) as usize;
+    taps.first = (centre - reach) as usize;
+    taps.values.clear();
+    taps.values.resize(n_beside, 0.0);
+    taps.values.extend((0..=n_beside).map(|z| z as f64).map(value));
+    for z in 1..=n_beside {
+        taps.values[n_beside - z] = taps.values[n_beside + z];
     }
 }
 

@@ -57,7 +57,8 @@ pub fn run<const D: usize>(
     control: &dyn Control,
     sink: Sink,
 ) -> Result<Outcome, RunError> {
-    let site = Site::<D>::new(plan, flow_of(plan, settings)?)?;
+    let mut site = Site::<D>::new(plan, flow_of(plan, settings)?)?;
+    site.starts_known = settings.starts.clone();
     in_medium(&site, Masses { settings, control, sink })
 }
 

@@ -37,5 +37,6 @@ mod water;
 mod wells;
 pub(super) mod world;
 
+pub use initial::Starts;
 pub use media::run;
 pub use shape::{PRODUCTS, dilution, product};

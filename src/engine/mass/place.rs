@@ -52,7 +52,7 @@ pub struct Cells<const D: usize> {
     low: [f64; D],
     width: [f64; D],
     n: [usize; D],
-    masses: Running,
+    masses: Arc<Running>,
 }
 
 /// Rectangles of one side with a weight each.
@@ -66,7 +66,7 @@ pub struct Faces<const D: usize> {
 const MOST_CELLS: f64 = 1_048_576.0;
 
 /// Cells that are looked at together.
-const BATCH: usize = 4096;
+const BATCH: usize = 1024;
 
 /// Parts of a cell along each axis beside a jump, by the number of axes, and in all, at most.
 const PARTS: [usize; 3] = [1, 16, 6];
@@ -87,18 +87,28 @@ impl<const D: usize> Cells<D> {
     /// - Source: midpoint rule.
     /// - Shape: running sums, which never fall where no mass is below zero.
     pub fn new(low: [f64; D], high: [f64; D], mass: impl Fn(&[[f64; D]]) -> Vec<f64>) -> Self {
+        let mut cells = Self::with(low, high, Arc::new(Running::new(Vec::new())));
+        cells.masses = Arc::new(cells.integrated(mass));
+        cells
+    }
+
+    /// The same, with sums that were worked out before.
+    pub fn with(low: [f64; D], high: [f64; D], masses: Arc<Running>) -> Self {
         let n = shape(low, high);
-        let width: [f64; D] = std::array::from_fn(|axis| (high[axis] - low[axis]) / n[axis] as f64);
-        let volume: f64 = width.iter().product();
-        let n_cells: usize = n.iter().product();
-        let mut cells = Self { low, width, n, masses: Running::new(Vec::new()) };
+        let width = std::array::from_fn(|axis| (high[axis] - low[axis]) / n[axis] as f64);
+        Self { low, width, n, masses }
+    }
+
+    fn integrated(&self, mass: impl Fn(&[[f64; D]]) -> Vec<f64>) -> Running {
+        let volume: f64 = self.width.iter().product();
+        let n_cells: usize = self.n.iter().product();
         let mut sums = Vec::with_capacity(n_cells);
         for first in (0..n_cells).step_by(BATCH) {
             let centres: Vec<[f64; D]> =
-                (first..(first + BATCH).min(n_cells)).map(|cell| cells.inside(cell, [0.5; D])).collect();
+                (first..(first + BATCH).min(n_cells)).map(|cell| self.inside(cell, [0.5; D])).collect();
             sums.extend(mass(&centres));
         }
-        cells.refine(&mut sums, &mass);
+        self.refine(&mut sums, &mass);
         // A million roundings would show in the total: what each of them loses is kept.
         let (mut sum, mut lost) = (0.0_f64, 0.0_f64);
         for own in &mut sums {
@@ -108,8 +118,12 @@ impl<const D: usize> Cells<D> {
             sum = next;
             *own = sum;
         }
-        cells.masses = Running::new(sums);
-        cells
+        Running::new(sums)
+    }
+
+    /// Sums that [`Self::with`] takes.
+    pub fn sums(&self) -> Arc<Running> {
+        self.masses.clone()
     }
 
     /// Takes means over parts of cells beside a jump, as along lines cells are small enough, unless there are too many.

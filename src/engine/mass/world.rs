@@ -11,9 +11,10 @@ use super::super::track::medium::{Carrier, Medium};
 use super::super::track::noise::Draws;
 use super::super::track::tracker::Tracker;
 use super::super::track::walls::Ends;
+use super::initial::Starts;
 use crate::flow::{FaceFlow, FlowSeries};
 use crate::maths::wide::Width;
-use crate::plan::tape::Tape;
+use crate::plan::tape::{Operation, Tape};
 use crate::plan::transport::Transport;
 use crate::plan::{Normals, Plan};
 use std::sync::Arc;
@@ -30,6 +31,8 @@ pub struct Site<'a, const D: usize> {
     pub calendar: Calendar,
     pub low: [f64; D],
     pub high: [f64; D],
+    /// What other runs of the program may have integrated before.
+    pub starts_known: Option<Starts>,
 }
 
 impl<'a, const D: usize> Site<'a, D> {
@@ -44,7 +47,8 @@ impl<'a, const D: usize> Site<'a, D> {
         let (low, high) = (axis(|a| a.low), axis(|a| a.high));
         let calendar = Calendar::new(&plan.time, &starts);
         let flow = series.as_ref().map(|series| series.flow(0).clone());
-        let mut site = Self { plan, transport, flow, series, starts, calendar, low, high };
+        let mut site =
+            Self { plan, transport, flow, series, starts, calendar, low, high, starts_known: None };
         let changes: Vec<f64> = site.starts.iter().copied().chain(site.switches_of_held()).collect();
         site.calendar = Calendar::new(&plan.time, &changes);
         Ok(site)
@@ -80,6 +84,9 @@ impl<'a, const D: usize> Site<'a, D> {
 
     /// A tape at places, at a time.
     pub fn evaluate(&self, tape: &Tape, places: &[[f64; D]], t: f64) -> Vec<f64> {
+        if let [Operation::Constant(value)] = tape.operations[..] {
+            return vec![value; places.len()];
+        }
         let mut inputs = [const { Vec::new() }; 4];
         for (idx, input) in inputs.iter_mut().enumerate() {
             let axis = self.plan.axes.iter().position(|axis| axis.index == idx);

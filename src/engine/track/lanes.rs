@@ -9,6 +9,16 @@ pub type Lane = [f64; LANES];
 /// One number in 32 bits per particle: displacements, not positions.
 pub type Narrow = [f32; LANES];
 
+/// A number of each lane. `map` of arrays calls a function per lane here, and costs a sixth of a plain walk.
+#[inline(always)]
+pub fn each(of: &Lane, value: impl Fn(f64) -> f64) -> Lane {
+    let mut values = [0.0; LANES];
+    for (to, &from) in values.iter_mut().zip(of) {
+        *to = value(from);
+    }
+    values
+}
+
 /// A group of particles on their way. Lanes from `n` on hold copies of the first particle that nobody reads.
 #[derive(Debug, Clone)]
 pub struct Lanes<const D: usize> {

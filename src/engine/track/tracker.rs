@@ -5,7 +5,7 @@
 
 use super::drains::Drain;
 use super::interfaces::Interfaces;
-use super::lanes::{LANES, Lane, Lanes};
+use super::lanes::{LANES, Lane, Lanes, each};
 use super::medium::{Carrier, Criteria, Leap, Medium};
 use super::monitors::{Crossing, Gap, Plane};
 use super::noise::{Draws, Normals};
@@ -128,7 +128,7 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
                         bench.leap.assign(&left);
                     }
                     self.medium.look(carrier, &bench.lanes.positions, &mut bench.look);
-                    let start: Lane = left.map(|left| t + (steps.dt - left));
+                    let start = each(&left, |left| t + (steps.dt - left));
                     self.displace(carrier, step, (&start, t + EARLIEST * steps.dt), bench, events);
                     bench.displacements += bench.lanes.n as u64;
                     if is_late {
@@ -191,7 +191,7 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
         for sub_step in 0..MOST_SUB_STEPS {
             self.medium.look(carrier, &bench.lanes.positions, &mut bench.look);
             self.limit(carrier, criteria, (&bench.look, &bench.lanes.positions), dt, &mut time);
-            let start: Lane = left.map(|left| t + dt - left);
+            let start = each(&left, |left| t + dt - left);
             let mut is_going = 0_u64;
             for lane in 0..LANES {
                 // A sliver of a sub-step is taken with the one before it.

@@ -4,7 +4,7 @@
 //! deliberately stores no books: what happens is told with the population that it happened to.
 
 use super::fates::{Chain, Close, Draw, Piece, Span, Spent, TooManyTurns};
-use super::lanes::{LANES, Lane, Lanes};
+use super::lanes::{LANES, Lane, Lanes, each};
 use super::medium::{Carrier, Medium};
 use super::monitors::Crossing;
 use super::tracker::{Bench, EARLIEST, Events, MOST_SUB_STEPS, Steps, TooManySubSteps, Tracker};
@@ -328,7 +328,7 @@ impl<const D: usize, M: Medium<D>> Tracker<D, M> {
                 fates.number = Some(number / 8);
                 chain.first(self.width, &bench.lanes.ids, number / 8, &mut fates.rows);
             }
-            let start: Lane = fates.left.map(|left| t + (dt - left));
+            let start = each(&fates.left, |left| t + (dt - left));
             let drawn = fates.draw(chain, &bench.lanes.ids, (number, kind, going));
             drawn.map_err(|lane| TooManySubSteps { id: bench.lanes.ids[lane], step })?;
             bench.displacements += u64::from(going.count_ones());

@@ -5,6 +5,7 @@
 
 use super::{Binary, Operation, Tape, Unary};
 use crate::data;
+use crate::maths::wide::Width;
 
 /// Points that are evaluated together.
 const LANE: usize = 256;
@@ -32,13 +33,21 @@ impl Tape {
     /// The values at all points of the input columns, which are as long as `out`. `scratch` holds the
     /// registers and may be used again. The tape must have passed [`Tape::check`] for these inputs.
     pub fn evaluate_block(&self, inputs: &[&[f64]], scratch: &mut Vec<f64>, out: &mut [f64]) {
+        let width = Width::widest();
         scratch.resize(self.operations.len() * LANE, 0.0);
         for start in (0..out.len()).step_by(LANE) {
             let end = (start + LANE).min(out.len());
             for (idx, operation) in self.operations.iter().enumerate() {
                 let (written, rest) = scratch.split_at_mut(idx * LANE);
+                if let Operation::Constant(value) = operation {
+                    // It stays in its register.
+                    if start == 0 {
+                        rest[..LANE].fill(*value);
+                    }
+                    continue;
+                }
                 let target = &mut rest[..end - start];
-                evaluate_lane(operation, inputs, start, written, target);
+                width.run(Lane { operation, inputs, start, written, target });
             }
             let result = self.operations.len().saturating_sub(1) * LANE;
             out[start..end].copy_from_slice(&scratch[result..result + end - start]);
@@ -46,47 +55,73 @@ impl Tape {
     }
 }
 
-fn evaluate_lane(
-    operation: &Operation,
-    inputs: &[&[f64]],
+/// An operation on the points of a lane, compiled for what the machine has.
+struct Lane<'a> {
+    operation: &'a Operation,
+    inputs: &'a [&'a [f64]],
     start: usize,
-    written: &[f64],
-    target: &mut [f64],
-) {
-    let n = target.len();
-    let read = |register: u16| &written[usize::from(register) * LANE..][..n];
-    match *operation {
-        Operation::Constant(value) => target.fill(value),
-        Operation::Input(input) => target.copy_from_slice(&inputs[usize::from(input)][start..start + n]),
-        Operation::Unary(unary, a) => unary_lane(unary, read(a), target),
-        Operation::Binary(binary, a, b) => binary_lane(binary, read(a), read(b), target),
-        Operation::Select(condition, a, b) => {
-            for (((value, &c), &a), &b) in target.iter_mut().zip(read(condition)).zip(read(a)).zip(read(b)) {
-                *value = select(c, a, b);
+    written: &'a [f64],
+    target: &'a mut [f64],
+}
+
+impl pulp::NullaryFnOnce for Lane<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Self { operation, inputs, start, written, target } = self;
+        let n = target.len();
+        let read = |register: u16| &written[usize::from(register) * LANE..][..n];
+        match *operation {
+            Operation::Constant(value) => target.fill(value),
+            Operation::Input(input) => {
+                target.copy_from_slice(&inputs[usize::from(input)][start..start + n]);
             }
-        }
-        Operation::Table(ref lookup) => {
-            for (idx, value) in target.iter_mut().enumerate() {
-                let at = lookup.at.map(|register| read(register)[idx]);
-                *value = lookup.table.look(data::Lookup::Value, at, lookup.beyond);
+            Operation::Unary(unary, a) => unary_lane(unary, read(a), target),
+            Operation::Binary(binary, a, b) => binary_lane(binary, read(a), read(b), target),
+            Operation::Select(condition, a, b) => {
+                for (((value, &c), &a), &b) in
+                    target.iter_mut().zip(read(condition)).zip(read(a)).zip(read(b))
+                {
+                    *value = select(c, a, b);
+                }
+            }
+            Operation::Table(ref lookup) => {
+                for (idx, value) in target.iter_mut().enumerate() {
+                    let at = lookup.at.map(|register| read(register)[idx]);
+                    *value = lookup.table.look(data::Lookup::Value, at, lookup.beyond);
+                }
             }
         }
     }
 }
 
 /// One loop per operation, so that the choice is made once per lane.
+#[inline(always)]
 fn unary_lane(unary: Unary, a: &[f64], target: &mut [f64]) {
     macro_rules! each {
         ($($name:ident),*) => {
             match unary {
-                $(Unary::$name => target.iter_mut().zip(a).for_each(|(t, &a)| *t = Unary::$name.apply(a)),)*
+                $(Unary::$name => {
+                    for (t, &a) in target.iter_mut().zip(a) {
+                        *t = Unary::$name.apply(a);
+                    }
+                })*
             }
         };
     }
     each!(Negate, Not, Abs, Sqrt, Exp, Ln, Log10, Sin, Cos, Tanh, Erf, Erfc);
 }
 
+#[inline(always)]
 fn binary_lane(binary: Binary, a: &[f64], b: &[f64], target: &mut [f64]) {
+    if binary == Binary::Power && b.iter().all(|&b| b == 2.0) {
+        // As `Power` has it, without a choice per point.
+        for (t, &a) in target.iter_mut().zip(a) {
+            *t = a * a;
+        }
+        return;
+    }
     macro_rules! each {
         ($($name:ident),*) => {
             match binary {
