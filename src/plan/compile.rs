@@ -101,7 +101,7 @@ fn compile_from(
             "none of the dispersion is exchange: mixing_fraction is 0",
         );
     }
-    if scenario.estimation.is_some() && scenario.particles.shares.is_none() {
+    if scenario.estimation.is_some() && draft.plan.kernels.is_none() {
         draft.leave_out("kernels of particles with mass", "parcels of fluid carry concentrations");
     }
     if let Err(reason) = draft.plan.check() {

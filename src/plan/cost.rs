@@ -344,7 +344,7 @@ fn react_cost(plan: &Plan, scales: Option<&TimeScales>) -> f64 {
             sub_steps(plan, chemistry, scales) * (price(table::ROSENBROCK) + speciations)
         }
     };
-    if let Some(kernels) = &plan.kernels {
+    if let Some(kernels) = plan.kernels.as_ref().filter(|_| plan.carries_mass()) {
         // Cells react, and not particles.
         let n_cells = 0.5 * kernels.n_cells() as f64;
         return integrated * n_cells / plan.particles.count as f64;

@@ -76,14 +76,17 @@ pub(super) fn lower(
     Some(kernels)
 }
 
-/// The kernels of a scene with masses: if it has the statement, or reactions that need them.
+/// The kernels of a scene: with masses if it has the statement, or reactions that need them; with fluid if outputs show them.
 fn kernels(scenario: &Scenario, axes: &[Axis], reacts: bool) -> Option<Kernels> {
-    scenario.particles.shares.as_ref()?;
-    let needs =
-        |output: &crate::scenario::Output| matches!(output.kind, OutputKind::Density | OutputKind::Kernels);
-    let is_needed = reacts || scenario.outputs.iter().any(needs);
+    let carries_mass = scenario.particles.shares.is_some();
+    let is_shown = scenario.outputs.iter().any(|output| output.kind.is_by_kernels());
     let usual = Estimation::usual(scenario.particles.span);
-    let written = scenario.estimation.as_ref().or(Some(&usual).filter(|_| is_needed))?;
+    let written = match &scenario.estimation {
+        Some(written) if carries_mass || is_shown => written,
+        _ if (reacts && carries_mass) || is_shown => &usual,
+        _ => return None,
+    };
+    let reacts = reacts && carries_mass;
     let reacting = match (reacts, &written.reacting) {
         (false, _) => None,
         (true, Some(asked)) => Some(asked.value),
@@ -103,7 +106,7 @@ fn kernels(scenario: &Scenario, axes: &[Axis], reacts: bool) -> Option<Kernels> 
         loops: written.loops,
         refresh: written.refresh,
         narrowing: written.narrowing,
-        shows: reacts || scenario.estimation.is_some(),
+        shows: reacts || (carries_mass && scenario.estimation.is_some()),
         reacting,
     })
 }

@@ -300,7 +300,12 @@ impl OutputKind {
 
     /// Whether only particles that carry mass have it: parcels of water pass again and again with other contents.
     pub fn needs_masses(self) -> bool {
-        matches!(self, OutputKind::FirstPassage | OutputKind::Density | OutputKind::Kernels)
+        self == OutputKind::FirstPassage
+    }
+
+    /// Whether it is found by kernels, whatever the particles are.
+    pub fn is_by_kernels(self) -> bool {
+        matches!(self, OutputKind::Density | OutputKind::Kernels)
     }
 }
 

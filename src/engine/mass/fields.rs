@@ -9,6 +9,7 @@ use super::super::snapshot::Row;
 use super::flock::Flock;
 use super::kernels::{Finder, Found};
 use super::observe::Scene;
+use crate::plan::Axis;
 use crate::state::grid::Grid;
 
 /// A density on the bins of an output: mean and standard error, concentrations.
@@ -61,50 +62,71 @@ impl<const D: usize> Scene<'_, D> {
     pub fn density(&self, population: Option<usize>) -> Result<Vec<Row>, RunError> {
         let Some(population) = population else { return Ok(Vec::new()) };
         let (finder, found) = self.find(population)?;
-        let lattice = &finder.lattice;
-        let first = lattice.axes().start;
-        let bins: [usize; D] = std::array::from_fn(|axis| lattice.cells[first + axis]);
-        let Some(grid) = Grid::new(self.site.low, self.site.high, bins, [false; D]) else {
-            return Ok(Vec::new());
-        };
-        let porosity = self.site.porosity_of_bins(&grid);
+        let Some(grid) = finder.grid() else { return Ok(Vec::new()) };
+        let mut water = self.site.porosity_of_bins(&grid);
         let retardation = self.site.transport.populations[population].retardation;
-        let mut known = found.tally.cells.iter().zip(&found.tally.counts).enumerate().peekable();
+        water.iter_mut().for_each(|water| *water *= retardation);
+        Ok(found.rows(&self.site.plan.axes, &grid, &water))
+    }
+
+    /// How wide the kernels of a population are.
+    pub fn kernel_sizes(&self, population: Option<usize>) -> Result<Vec<Row>, RunError> {
+        let found = population.map(|population| self.find(population)).transpose()?;
+        Ok(vec![Found::size_row(found.map(|(_, found)| found))])
+    }
+}
+
+impl Finder {
+    /// The cells of the lattice as bins.
+    pub fn grid<const D: usize>(&self) -> Option<Grid<D>> {
+        let first = self.lattice.axes().start;
+        let bins: [usize; D] = std::array::from_fn(|axis| self.lattice.cells[first + axis]);
+        let low: [f64; D] = self.low[..].try_into().ok()?;
+        let high =
+            std::array::from_fn(|axis| low[axis] + bins[axis] as f64 * self.lattice.edge[first + axis]);
+        Grid::new(low, high, bins, [false; D])
+    }
+}
+
+impl Found {
+    /// A row for each cell with some density; `water` is what a concentration is per, by cell.
+    pub fn rows<const D: usize>(&self, axes: &[Axis], grid: &Grid<D>, water: &[f64]) -> Vec<Row> {
+        let first = self.projection.lattice().axes().start;
+        let mut known = self.tally.cells.iter().zip(&self.tally.counts).enumerate().peekable();
         let mut rows = Vec::new();
-        for (cell, &density) in found.density.iter().enumerate().filter(|(_, density)| **density > 0.0) {
+        for (cell, &density) in self.density.iter().enumerate().filter(|(_, density)| **density > 0.0) {
             while known.next_if(|(_, (own, _))| (**own as usize) < cell).is_some() {}
             let here = known.next_if(|(_, (own, _))| **own as usize == cell);
-            let water = porosity[cell] * retardation;
+            let water = water[cell];
             let mut numbers = vec![f64::NAN; 11];
-            numbers[..3].copy_from_slice(&[density / water, found.standard_error[cell] / water, density]);
+            numbers[..3].copy_from_slice(&[density / water, self.standard_error[cell] / water, density]);
             let centre = grid.centre(cell);
-            for (rank, axis) in self.site.plan.axes.iter().enumerate() {
+            for (rank, axis) in axes.iter().enumerate() {
                 numbers[3 + axis.index] = centre[rank];
-                let own = here.and_then(|(idx, _)| found.cells.get(idx));
+                let own = here.and_then(|(idx, _)| self.cells.get(idx));
                 let along = |own: &Cell| own.matrix()[first + rank][first + rank].sqrt();
-                let h = own.map_or(found.one[first + rank], along);
+                let h = own.map_or(self.one[first + rank], along);
                 numbers[6 + axis.index] = if h > 0.0 { h } else { f64::NAN };
             }
             if let Some((idx, (_, count))) = here {
-                numbers[9] = found.cells.get(idx).map_or(f64::NAN, |own| own.sigma);
+                numbers[9] = self.cells.get(idx).map_or(f64::NAN, |own| own.sigma);
                 numbers[10] = *count;
             } else {
                 numbers[10] = 0.0;
-                if !found.cells.is_empty() {
+                if !self.cells.is_empty() {
                     numbers[6..9].fill(f64::NAN);
                 }
             }
             rows.push(Row { place: 0, numbers });
         }
-        Ok(rows)
+        rows
     }
 
-    /// How wide the kernels of a population are.
-    pub fn kernel_sizes(&self, population: Option<usize>) -> Result<Vec<Row>, RunError> {
+    /// How wide kernels are; of nothing, where there are none.
+    pub fn size_row(found: Option<&Self>) -> Row {
         let mut numbers = vec![f64::NAN, f64::NAN, f64::NAN, f64::NAN, 0.0, 0.0, 0.0];
-        let Some(population) = population else { return Ok(vec![Row { place: 0, numbers }]) };
-        let (finder, found) = self.find(population)?;
-        let axes = finder.lattice.axes();
+        let Some(found) = found else { return Row { place: 0, numbers } };
+        let axes = found.projection.lattice().axes();
         let mut sizes: Vec<(f64, f64)> = Vec::new();
         let mut stretches: Vec<(f64, f64)> = Vec::new();
         for (cell, count) in found.cells.iter().zip(&found.tally.counts).filter(|(cell, _)| cell.h > 0.0) {
@@ -129,7 +151,7 @@ impl<const D: usize> Scene<'_, D> {
         numbers[4] = found.tally.effective();
         numbers[5] = found.tally.counts.iter().sum();
         numbers[6] = found.n_loops as f64;
-        Ok(vec![Row { place: 0, numbers }])
+        Row { place: 0, numbers }
     }
 }
 

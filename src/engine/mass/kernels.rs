@@ -16,6 +16,7 @@ use crate::maths::vector::pow;
 use crate::maths::wide::Width;
 use crate::plan::kernels::{FOURTH, Kernels, Manner, Rule, Weighing};
 use crate::plan::transport::SideRule;
+use crate::plan::{Axis, Plan, Side};
 
 /// Particles that a kernel should hold which reacts.
 const FEWEST: f64 = 4.0;
@@ -27,7 +28,7 @@ const EVEN: f64 = 1e-9;
 #[derive(Debug, Clone)]
 pub struct Finder {
     pub lattice: Lattice,
-    low: Vec<f64>,
+    pub(super) low: Vec<f64>,
     kernels: Kernels,
     width: Width,
     /// Of the flow, by cell of the lattice, if kernels follow it.
@@ -57,24 +58,56 @@ impl Finder {
             (n, (site.high[axis] - site.low[axis]) / n as f64, ends(site, axis, is_mobile))
         };
         let axes: Vec<(usize, f64, [End; 2])> = (0..D).map(axis).collect();
-        let lattice = Lattice::new(&axes).ok_or_else(|| unsound("cells of kernels that are none"))?;
-        Ok(Self { lattice, low: site.low.to_vec(), kernels, width, directions: None, order: Order::Second })
+        Self::on(&axes, site.low.to_vec(), kernels, width)
+    }
+
+    /// The same for parcels of water, by what the sides of the plan are to them.
+    pub fn of_water<const D: usize>(
+        plan: &Plan,
+        site: Option<&Site<D>>,
+        width: Width,
+    ) -> Result<Self, RunError> {
+        let kernels = plan.kernels.clone().ok_or_else(|| unsound("no kernels"))?;
+        let axis = |(idx, (axis, &n)): (usize, (&Axis, &usize))| {
+            let is_ring = axis.low_side == Side::Periodic;
+            let usual = [if is_ring { End::Wrap } else { End::Mirror }; 2];
+            // Water that leaves takes its neighbours' place: its contents do not end there.
+            let ends = site.map_or(usual, |site| ends(site, idx, false));
+            (n, (axis.high - axis.low) / n as f64, ends)
+        };
+        let axes: Vec<_> = plan.axes.iter().zip(&kernels.cells).enumerate().map(axis).collect();
+        Self::on(&axes, plan.axes.iter().map(|axis| axis.low).collect(), kernels, width)
+    }
+
+    fn on(
+        axes: &[(usize, f64, [End; 2])],
+        low: Vec<f64>,
+        kernels: Kernels,
+        width: Width,
+    ) -> Result<Self, RunError> {
+        let lattice = Lattice::new(axes).ok_or_else(|| unsound("cells of kernels that are none"))?;
+        Ok(Self { lattice, low, kernels, width, directions: None, order: Order::Second })
     }
 
     /// The same for densities that are shown at a time: with kernels along the flow and of the order that the plan says.
     pub fn shown<const D: usize>(mut self, site: &Site<D>, population: usize, t: f64) -> Self {
-        if self.kernels.order == FOURTH {
-            self.order = Order::Fourth;
-        }
         if self.kernels.manner == Manner::Adaptive {
             self.hold(site, population, t);
         }
+        let flows = site.transport.flows();
+        self.asked(|place: [f64; D]| site.velocity(&flows, &place, t))
+    }
+
+    /// Of the order that the plan says, and along the flow if it says so.
+    pub fn asked<const D: usize>(mut self, velocity: impl Fn([f64; D]) -> [f64; D]) -> Self {
+        if self.kernels.order == FOURTH {
+            self.order = Order::Fourth;
+        }
         if self.kernels.is_oriented && D > 1 {
-            let (first, flows) = (self.lattice.axes().start, site.transport.flows());
+            let first = self.lattice.axes().start;
             let direction = |cell: usize| {
-                let own = site.velocity(&flows, &self.centre(cell), t);
                 let mut all = [0.0; 3];
-                all[first..].copy_from_slice(&own);
+                all[first..].copy_from_slice(&velocity(self.centre(cell)));
                 all
             };
             self.directions = Some((0..self.lattice.n_cells()).map(direction).collect());
@@ -139,8 +172,17 @@ impl Finder {
             let weights = flock.weights(units);
             masses.extend((0..flock.len()).map(weights));
         }
-        let positions = positions.each_ref().map(|axis| &axis[..]);
-        let tally = Tally::of(&self.lattice, &self.low, &positions, Some(&masses));
+        self.find_at(&positions.each_ref().map(|axis| &axis[..]), &masses, start)
+    }
+
+    /// Kernels of points with a mass each.
+    pub fn find_at(
+        &self,
+        positions: &[&[f64]],
+        masses: &[f64],
+        start: Option<f64>,
+    ) -> Result<Found, RunError> {
+        let tally = Tally::of(&self.lattice, &self.low, positions, Some(masses));
         match self.kernels.manner {
             Manner::Adaptive => Ok(self.adaptive(tally, start)),
             Manner::Global | Manner::Fixed => self.one(tally),

@@ -13,7 +13,7 @@ pub(super) mod gate;
 mod in_time;
 mod initial;
 mod inlets;
-mod kernels;
+pub(super) mod kernels;
 mod march;
 pub(super) mod media;
 mod observe;

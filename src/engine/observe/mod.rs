@@ -5,6 +5,7 @@
 
 mod budget;
 mod chemistry;
+mod kernels;
 mod lab;
 mod look;
 mod mixing;
@@ -23,6 +24,7 @@ use crate::plan::{Output, OutputKind, Plan, Quantity};
 use crate::state::grid::Grid;
 use crate::state::particles::Block;
 use chemistry::Needs;
+use kernels::ByKernels;
 pub use lab::{Draws, Instant, Lab};
 use look::{Look, Sums};
 use mixing::Mixing;
@@ -63,15 +65,20 @@ pub fn observe<const D: usize>(
         let what = run.reactions.explain(program, why);
         return Err(RunError::Chemistry { step: due.steps, particle, what, why });
     }
-    let snapshot = |(&output_idx, values)| {
+    let mut by_kernels = None;
+    let mut snapshot = |(&output_idx, mut values): (&usize, Values)| {
         let output = &program.plan.outputs[output_idx];
-        let values = listed_only(values, output);
+        if output.kind.is_by_kernels() {
+            let mut own = by_kernels.take().map_or_else(|| ByKernels::new(run, due.t), Ok)?;
+            values = own.values(output, &values)?;
+            by_kernels = Some(own);
+        }
         match values.overflow() {
             Some(column) => Err(overflow(program.plan, output, column, due.t)),
             None => Ok(Snapshot { output_idx, t: due.t, values }),
         }
     };
-    due.outputs.iter().zip(values).map(snapshot).collect()
+    due.outputs.iter().zip(values).map(&mut snapshot).collect()
 }
 
 /// Particles may have values that are numbers and sums, products or amounts that are none.
@@ -84,15 +91,6 @@ fn overflow(plan: &Plan, output: &Output, column: usize, t: f64) -> RunError {
         None => "?".to_owned(),
     };
     RunError::NonFiniteOutput { t, kind: output.kind, quantity }
-}
-
-/// Particles carry a column for each species of the plan; an output has those that it lists.
-fn listed_only(values: Values, output: &Output) -> Values {
-    let Values::Particles { positions, concentrations } = values else { return values };
-    let column = |quantity: &Quantity| match *quantity {
-        Quantity::Species(s) | Quantity::Pair(s, _) => concentrations[s].clone(),
-    };
-    Values::Particles { positions, concentrations: output.quantities.iter().map(column).collect() }
 }
 
 fn bad_bins() -> RunError {
@@ -159,7 +157,8 @@ fn sum_alike<const D: usize>(
     let values = tallies.iter().enumerate().map(|(idx, tally)| {
         let first = first.get(first_at[idx]..first_at[idx + 1]).unwrap_or_default();
         let second = second.get(second_at[idx]..second_at[idx + 1]).unwrap_or_default();
-        tally.values(&run.program, first, second).unwrap_or_else(|| particles(run, instant, means, needs))
+        let listed = || particles(run, instant, (means, needs), tally.listed());
+        tally.values(&run.program, first, second).unwrap_or_else(listed)
     });
     values.collect()
 }
@@ -217,9 +216,14 @@ fn sweep<const D: usize>(
     merged
 }
 
-/// Every particle, in the order of numbers.
-fn particles<const D: usize>(run: &Run<D>, instant: &Instant<D>, means: &Means, needs: &Needs) -> Values {
-    let n_species = run.program.plan.species.len();
+/// Every particle, in the order of numbers, with its concentrations of some species.
+fn particles<const D: usize>(
+    run: &Run<D>,
+    instant: &Instant<D>,
+    (means, needs): (&Means, &Needs),
+    species: &[usize],
+) -> Values {
+    let n_species = species.len();
     let of_block = |block_idx: usize| {
         let block = &run.blocks[block_idx];
         let mut columns = vec![Vec::with_capacity(block.n_particles); D + n_species];
@@ -230,7 +234,7 @@ fn particles<const D: usize>(run: &Run<D>, instant: &Instant<D>, means: &Means, 
                     let resolved = Some((means, needs));
                     let (sums, target) = (Sums::None, &mut [][..]);
                     run.width.run(Look { run, instant, resolved, block, range, lab, sums, target });
-                    let sources = lab.positions.iter().chain(&lab.species);
+                    let sources = lab.positions.iter().chain(species.iter().map(|&idx| &lab.species[idx]));
                     columns
                         .iter_mut()
                         .zip(sources)

@@ -52,7 +52,10 @@ pub enum Tally<'a, const D: usize> {
         species: Vec<usize>,
     },
     /// Collected apart, as nothing is summed.
-    Particles,
+    /// What is seen of them is listed, particle by particle.
+    Particles {
+        species: Vec<usize>,
+    },
 }
 
 /// The bins of an output.
@@ -123,7 +126,9 @@ impl<'a, const D: usize> Tally<'a, D> {
                 Self::Total { in_bins: in_bins(&species), species }
             }
             OutputKind::Mixing => Self::Mixing(mixing?),
-            OutputKind::Particles => Self::Particles,
+            OutputKind::Particles | OutputKind::Density | OutputKind::Kernels => {
+                Self::Particles { species: species(output) }
+            }
             OutputKind::Moments => Self::Moments { species: species(output) },
             OutputKind::Dilution => {
                 Self::Dilution { bins: Bins::new(program, output)?, species: species(output) }
@@ -145,8 +150,16 @@ impl<'a, const D: usize> Tally<'a, D> {
                 }
             }
             // Only particles that carry mass have it: a plan that asks for it is not run here.
-            OutputKind::FirstPassage | OutputKind::Density | OutputKind::Kernels => return None,
+            OutputKind::FirstPassage => return None,
         })
+    }
+
+    /// Species that are listed, particle by particle.
+    pub fn listed(&self) -> &[usize] {
+        match self {
+            Self::Particles { species } => species,
+            _ => &[],
+        }
     }
 
     /// Bins over which it sums: what decides how blocks are grouped.
@@ -160,7 +173,7 @@ impl<'a, const D: usize> Tally<'a, D> {
             | Self::Moments { .. }
             | Self::Within { .. }
             | Self::Budget(_)
-            | Self::Particles => 1,
+            | Self::Particles { .. } => 1,
         }
     }
 
@@ -177,7 +190,7 @@ impl<'a, const D: usize> Tally<'a, D> {
             Self::Within { species, .. } => 1 + species.len(),
             Self::Budget(budget) => budget.species.len(),
             Self::Dilution { bins, species } => bins.grid.n_slots() * (1 + species.len()),
-            Self::Particles => 0,
+            Self::Particles { .. } => 0,
         }
     }
 
@@ -217,7 +230,7 @@ impl<'a, const D: usize> Tally<'a, D> {
                 let own = species.iter().map(|&idx| &lab.species[idx]);
                 add_binned(bins, lab, &own.collect::<Vec<_>>(), sums);
             }
-            Self::Particles => {}
+            Self::Particles { .. } => {}
         }
     }
 
@@ -256,7 +269,7 @@ impl<'a, const D: usize> Tally<'a, D> {
             Self::Dilution { bins, species } => {
                 Some(spread::dilutions(program, bins.grid.n_bins(), species.len(), first))
             }
-            Self::Particles => None,
+            Self::Particles { .. } => None,
         }
     }
 }
@@ -289,7 +302,7 @@ fn amount_in_bins<const D: usize>(
     Some(n_particles * (recipe.constant + sum / n_bins as f64))
 }
 
-fn species(output: &Output) -> Vec<usize> {
+pub fn species(output: &Output) -> Vec<usize> {
     let only = |quantity: &Quantity| match *quantity {
         Quantity::Species(idx) => Some(idx),
         Quantity::Pair(..) => None,

@@ -27,6 +27,7 @@ use super::program::Program;
 use super::schedule::Due;
 use super::track::tracker::{EARLIEST, Steps, TooManySubSteps};
 use super::{control::Settings, mass::flock};
+use crate::flow::FlowSeries;
 use crate::maths::wide::Width;
 use crate::state::particles::{BLOCK, Block};
 use crate::state::stream::{Purpose, Stream};
@@ -57,6 +58,8 @@ pub struct Water<const D: usize> {
     watched: Watched,
     /// Displacements done, one per particle.
     pub displacements: u64,
+    /// The flow on cells, if it is on cells.
+    flow: Option<FlowSeries>,
 }
 
 /// What came of the parcels of a block in a step.
@@ -90,7 +93,8 @@ impl<const D: usize> Water<D> {
         dues: &mut Vec<Due>,
     ) -> Result<(Self, Gates), RunError> {
         let plan = program.plan;
-        let site = Site::<D>::new(plan, flow_of(plan, settings)?)?;
+        let flow = flow_of(plan, settings)?;
+        let site = Site::<D>::new(plan, flow.clone())?;
         let cells = start::cells(&site);
         if let Some(cells) = &cells {
             program.volume = cells.total() / plan.particles.count as f64;
@@ -112,6 +116,7 @@ impl<const D: usize> Water<D> {
             has_memory: plan.reacts_in_steps(),
             most: plan.particles.count.saturating_mul(MOST_OVER).max(MOST_FEW),
             displacements: 0,
+            flow,
         };
         Ok((water, gates))
     }
@@ -232,6 +237,11 @@ impl<const D: usize> Water<D> {
         Err(RunError::OutOfMemory { bytes: 8 * n * (self.book.n_columns() + D + 1) as u64 })
     }
 
+    /// The flows on cells, if they are on cells.
+    pub fn flow(&self) -> Option<FlowSeries> {
+        self.flow.clone()
+    }
+
     /// Where parcels begin if porosity varies.
     pub fn cells(&self) -> Option<&Cells<D>> {
         self.cells.as_ref()
@@ -251,6 +261,7 @@ impl<const D: usize> Water<D> {
             most: self.most,
             watched: Watched::default(),
             displacements: 0,
+            flow: self.flow.clone(),
         }
     }
 }

@@ -14,8 +14,7 @@ pub(super) fn run(draft: &mut Draft) {
     let shows = kernels.shows;
     let is_read = |kind: OutputKind| match kind {
         OutputKind::Profile | OutputKind::Map => shows,
-        OutputKind::Density | OutputKind::Kernels => true,
-        _ => false,
+        _ => kind.is_by_kernels(),
     };
     let is_needed = kernels.reacting.is_some() || plan.outputs.iter().any(|output| is_read(output.kind));
     if !is_needed {
