@@ -76,7 +76,7 @@ impl Vessel {
         let factors = noise.map(|noise| {
             let factors =
                 noise.factors((&content.places, t + 0.5 * dt), &content.columns, &content.variances);
-            (factors, content.columns.clone())
+            (noise, factors, content.columns.clone())
         });
         if let Some(reactor) = &self.reactor {
             let mut chunks = chunks(content, &self.species, &self.memory);
@@ -98,8 +98,8 @@ impl Vessel {
                 return Err(refuse(plan, content, (step, idx * CHUNK + failure.particle), failure));
             }
         }
-        if let Some((factors, before)) = &factors {
-            correct(&mut content.columns, before, factors);
+        if let Some((noise, factors, before)) = &factors {
+            noise.correct(&mut content.columns, before, factors);
         }
         for reaction in &self.instant {
             complete(reaction, &mut content.columns);
@@ -159,26 +159,6 @@ fn refuse(plan: &Plan, content: &Content, (step, at): (u64, usize), failure: Fai
     let place: Vec<String> = along.map(|x| format!("{} m", precise(*x))).collect();
     let what = format!("in the cell at ({}): {}", place.join(", "), explain(plan, failure.why));
     RunError::Chemistry { step, particle: RunError::OF_NO_PARTICLE, what, why: failure.why }
-}
-
-/// Multiplies what has reacted, as far as there is enough for more of it.
-fn correct(columns: &mut [Vec<f64>], before: &[Vec<f64>], factors: &[f64]) {
-    for (cell, &wanted) in factors.iter().enumerate() {
-        let mut factor = wanted;
-        for (new, old) in columns.iter().zip(before) {
-            let (new, old) = (new[cell], old[cell]);
-            if new < old {
-                factor = factor.min(old / (old - new));
-            }
-        }
-        for (new, old) in columns.iter_mut().zip(before) {
-            let changed = old[cell] + factor * (new[cell] - old[cell]);
-            // What does not change keeps its last digit.
-            if factor != 1.0 && new[cell] != old[cell] {
-                new[cell] = changed.max(0.0);
-            }
-        }
-    }
 }
 
 /// `ξ = min_r c_r/ν_r`, taken of reactants and given to products.
