@@ -196,6 +196,54 @@ fn any_number_of_threads_gives_the_same_bits() {
     }
 }
 
+/// A species that is not there at first gets particles as heavy as those of the others, where one number is given for all.
+#[test]
+fn what_is_made_has_as_many_particles_as_it_needs() {
+    let text = "lamella 1
+species A, B
+domain line x = 0 m .. 1 m
+boundary left, right reflect
+dispersion 1e-3 m^2/s
+initial B = 1 mol/m^3
+reaction turn: B -> A @ 1 mol/m^3/s * B / (0.1 mol/m^3 + B)
+particles mass 2000
+run to 1 s, step 0.05 s
+output kernels A at t = 1 s
+output total A at t = 1 s
+";
+    for text in [text, &edited(text, "initial B", "initial A = 1e-3 mol/m^3, B")] {
+        let finished = run(text);
+        let amount = last(&finished)[0];
+        let n = finished.rows(OutputKind::Kernels, 0, None)[0].1[5];
+        tell(&format!("{n} particles of {amount} mol"));
+        assert!((n / (2000.0 * amount) - 1.0).abs() < 0.05, "{n} {amount}");
+    }
+}
+
+/// Both ways of a reversible reaction come to rest where they should, also in steps that are longer than that takes.
+/// Reference: `5 c_B = 10 c_A²` with `c_A + 2 c_B = 2`.
+#[test]
+fn a_reversible_reaction_comes_to_rest() {
+    let text = "lamella 1
+species A, B
+domain line x = 0 m .. 1 m
+boundary left, right reflect
+dispersion 1e-3 m^2/s
+initial A = 2 mol/m^3
+reaction turn: 2 A <-> B @ forward 10 m^3/mol/s, backward 5 /s
+particles mass A 500, B 500
+run to 2 s, step 0.05 s
+output total A at t = 2 s
+";
+    let right = (-1.0 + 33.0_f64.sqrt()) / 8.0;
+    for text in [text, &edited(text, "step 0.05 s", "step 1 s")] {
+        let found: Vec<f64> = (1..5).map(|seed| last(&with(text, &[], seed))[0]).collect();
+        let (mean, error) = mean_and_error(&found);
+        tell(&format!("at rest: {mean:.4} ± {error:.4} of {right:.4}"));
+        assert!((mean - right).abs() < 0.006, "{mean} of {right}");
+    }
+}
+
 /// An integrated initial concentration of another run changes no byte, and one that differs in anything is another.
 #[test]
 fn runs_may_share_what_they_begin_with() {

@@ -421,7 +421,12 @@ fn row_bytes(plan: &Plan, output: &Output) -> f64 {
 
 /// Bytes that one whole observation of every particle takes while it is written.
 fn particle_output_bytes(plan: &Plan) -> u64 {
-    let columns = |output: &Output| (plan.axes.len() + output.quantities.len()) as u64;
-    let of_particles = plan.outputs.iter().filter(|output| output.kind == OutputKind::Particles);
+    // Densities list them, too, and weigh one species after the other.
+    let columns = |output: &Output| {
+        let weighed = usize::from(output.kind.is_by_kernels());
+        (plan.axes.len() + output.quantities.len() + weighed) as u64
+    };
+    let lists = |kind: OutputKind| kind == OutputKind::Particles || kind.is_by_kernels();
+    let of_particles = plan.outputs.iter().filter(|output| lists(output.kind));
     of_particles.map(columns).max().unwrap_or(0) * 8 * plan.particles.count
 }

@@ -1,4 +1,4 @@
-//! Kernels of particles that carry mass, in words.
+//! Kernels that concentrations are found by, in words.
 //!
 //! Owns these lines of `lamella plan`. May use the plan. It deliberately decides nothing.
 
@@ -6,7 +6,7 @@ use super::Plan;
 use super::kernels::{FOURTH, Reacting};
 use crate::diagnostic::number;
 
-/// How concentrations are found of particles that carry mass.
+/// How concentrations are found of particles that carry mass, and densities of parcels.
 pub(super) fn lines(plan: &Plan) -> Vec<String> {
     let Some(kernels) = &plan.kernels else { return Vec::new() };
     let cells: Vec<String> = kernels.cells.iter().map(usize::to_string).collect();
@@ -20,15 +20,14 @@ pub(super) fn lines(plan: &Plan) -> Vec<String> {
     if kernels.searches() {
         let shape = if kernels.is_stretched { "may be longer along one axis" } else { "are round" };
         lines.push(format!(
-            "kernels {shape}; reflected at walls, so that mass stays inside; at most {} loops, to a change of {}",
+            "kernels {shape}; mass stays inside of walls; at most {} loops, to a change of {}",
             kernels.loops,
             number(kernels.tolerance)
         ));
     }
     if kernels.is_oriented {
-        lines.push(
-            "densities that are shown: kernels along the flow; those that react lie along the axes".into(),
-        );
+        let others = if kernels.reacting.is_some() { "; those that react lie along the axes" } else { "" };
+        lines.push(format!("densities that are shown: kernels along the flow{others}"));
     }
     if kernels.order == FOURTH {
         lines.push(

@@ -1,4 +1,4 @@
-//! How a plan finds concentrations of particles that carry mass, and how these react.
+//! How a plan finds concentrations of particles that carry mass, how these react, and densities of parcels of water.
 //!
 //! Owns the type, its lowering from the scene, and what a particle weighs that a reaction makes. May use the scenario. It
 //! deliberately finds no bandwidth: that hangs on particles.

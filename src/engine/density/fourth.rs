@@ -9,7 +9,7 @@ use super::lattice::{AXES, Field, Window};
 use crate::maths::vector::pow;
 
 /// How much wider kernels are than those that are best without a correction.
-const WIDER: f64 = 1.6;
+pub const WIDER: f64 = 1.6;
 
 impl Search<'_> {
     /// The density of masses, and variances for squares, on all of the lattice.

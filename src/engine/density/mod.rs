@@ -33,6 +33,7 @@ mod tally;
 mod taps;
 
 pub use adaptive::estimate;
+pub use fourth::WIDER;
 pub use global::{Global, Rule, Trouble, global, histogram};
 pub use kinds::{Adaptive, Cell, Estimate, Order, Shape, Start, Variant};
 pub use lattice::{End, Lattice};

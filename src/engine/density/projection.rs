@@ -127,17 +127,18 @@ impl Projection {
     /// - Source: `∫ W² = (2√π h)^{−d}` of a Gaussian.
     /// - Shape: one value per cell of the lattice.
     pub fn spread_squares(&self, cells: &[u32], squares: &[f64]) -> Vec<f64> {
-        let part = |cell: u32| -> f64 {
-            let h = self.bandwidths(cell as usize);
-            let of_axis = |axis: usize| match h[axis] / self.lattice.edge[axis] {
-                own if own > 0.0 => (0.5 / (std::f64::consts::PI.sqrt() * own)).min(1.0),
-                _ => 1.0,
-            };
-            self.lattice.axes().map(of_axis).product()
+        let weighed = cells.iter().zip(squares).map(|(&cell, square)| square * self.squared(cell as usize));
+        self.spread(cells, &weighed.collect::<Vec<f64>>())
+    }
+
+    /// About the sum over cells of the square of a cell's kernel: `Π_i min(1, 1/(2√π ĥ_i))`.
+    pub fn squared(&self, cell: usize) -> f64 {
+        let h = self.bandwidths(cell);
+        let of_axis = |axis: usize| match h[axis] / self.lattice.edge[axis] {
+            own if own > 0.0 => (0.5 / (std::f64::consts::PI.sqrt() * own)).min(1.0),
+            _ => 1.0,
         };
-        let weighed: Vec<f64> =
-            cells.iter().zip(squares).map(|(&cell, square)| square * part(cell)).collect();
-        self.spread(cells, &weighed)
+        self.lattice.axes().map(of_axis).product()
     }
 
     /// What the kernels of some cells find of a field.

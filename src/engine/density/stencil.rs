@@ -180,17 +180,18 @@ impl Part<'_> {
     fn add<const PIECES: usize>(&self, slab: &mut Slab, taps: &[Lent; AXES]) {
         let Self { low, high, weight, last } = *self;
         let mut padded = [[0.0; LANES]; PIECES];
-        for (piece, tap) in padded.as_flattened_mut().iter_mut().zip(last) {
-            *piece = *tap;
+        if PIECES > 0 {
+            padded.as_flattened_mut()[..last.len()].copy_from_slice(last);
         }
-        let of_planes = &taps[0].values()[low[0] - taps[0].first()..high[0] - taps[0].first()];
-        let of_rows = &taps[1].values()[low[1] - taps[1].first()..high[1] - taps[1].first()];
-        for (x, of_plane) in (low[0] - slab.first[0]..).zip(of_planes) {
-            let of_plane = weight * of_plane;
-            let start = (x * slab.cells[1] + low[1] - slab.first[1]) * slab.cells[2] + low[2] - slab.first[2];
-            let rows = slab.values[start..].chunks_mut(slab.cells[2]);
-            for (row, of_row) in rows.zip(of_rows) {
-                let of_row = of_plane * of_row;
+        let (planes, rows) = (&taps[0], &taps[1]);
+        for x in low[0]..high[0] {
+            let of_plane = weight * planes.values()[x - planes.first()];
+            let first = ((x - slab.first[0]) * slab.cells[1]) * slab.cells[2] + low[2] - slab.first[2];
+            for y in low[1]..high[1] {
+                let of_row = of_plane * rows.values()[y - rows.first()];
+                let start = first + (y - slab.first[1]) * slab.cells[2];
+                let end = (start + slab.cells[2]).min(slab.values.len());
+                let row = &mut slab.values[start..end];
                 let (pieces, _) = row.as_chunks_mut::<LANES>();
                 match pieces.first_chunk_mut::<PIECES>() {
                     Some(pieces) if PIECES > 0 => {
@@ -201,8 +202,8 @@ impl Part<'_> {
                         }
                     }
                     _ => {
-                        for (value, tap) in row.iter_mut().zip(last) {
-                            *value += of_row * tap;
+                        for at in 0..last.len() {
+                            row[at] += of_row * last[at];
                         }
                     }
                 }

@@ -12,7 +12,7 @@ use super::observe::Scene;
 use crate::plan::Axis;
 use crate::state::grid::Grid;
 
-/// A density on the bins of an output: mean and standard error, concentrations.
+/// Values on the bins of an output, or on cells: mean and standard error, concentrations.
 pub struct Binned {
     pub mean: Vec<f64>,
     pub standard_error: Vec<f64>,
@@ -66,7 +66,10 @@ impl<const D: usize> Scene<'_, D> {
         let mut water = self.site.porosity_of_bins(&grid);
         let retardation = self.site.transport.populations[population].retardation;
         water.iter_mut().for_each(|water| *water *= retardation);
-        Ok(found.rows(&self.site.plan.axes, &grid, &water))
+        let per_water =
+            |all: &[f64]| -> Vec<f64> { all.iter().zip(&water).map(|(own, water)| own / water).collect() };
+        let (mean, standard_error) = (per_water(&found.density), per_water(&found.standard_error));
+        Ok(found.rows(&self.site.plan.axes, &grid, &Binned { mean, standard_error }))
     }
 
     /// How wide the kernels of a population are.
@@ -89,17 +92,17 @@ impl Finder {
 }
 
 impl Found {
-    /// A row for each cell with some density; `water` is what a concentration is per, by cell.
-    pub fn rows<const D: usize>(&self, axes: &[Axis], grid: &Grid<D>, water: &[f64]) -> Vec<Row> {
+    /// A row for each cell with some density, and its concentration.
+    pub fn rows<const D: usize>(&self, axes: &[Axis], grid: &Grid<D>, concentrations: &Binned) -> Vec<Row> {
         let first = self.projection.lattice().axes().start;
         let mut known = self.tally.cells.iter().zip(&self.tally.counts).enumerate().peekable();
         let mut rows = Vec::new();
         for (cell, &density) in self.density.iter().enumerate().filter(|(_, density)| **density > 0.0) {
             while known.next_if(|(_, (own, _))| (**own as usize) < cell).is_some() {}
             let here = known.next_if(|(_, (own, _))| **own as usize == cell);
-            let water = water[cell];
             let mut numbers = vec![f64::NAN; 11];
-            numbers[..3].copy_from_slice(&[density / water, self.standard_error[cell] / water, density]);
+            let Binned { mean, standard_error } = concentrations;
+            numbers[..3].copy_from_slice(&[mean[cell], standard_error[cell], density]);
             let centre = grid.centre(cell);
             for (rank, axis) in axes.iter().enumerate() {
                 numbers[3 + axis.index] = centre[rank];

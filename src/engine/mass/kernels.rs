@@ -4,8 +4,8 @@
 //! nothing.
 
 use super::super::density::{
-    Adaptive, Cell, End, Global, Lattice, Order, Orientation, Projection, Shape, Tally, Variant, estimate,
-    global, histogram,
+    Adaptive, Cell, End, Global, Lattice, Order, Orientation, Projection, Shape, Tally, Variant, WIDER,
+    estimate, global, histogram,
 };
 use super::super::density::{Rule as DensityRule, Weighing as DensityWeighing};
 use super::super::error::RunError;
@@ -67,7 +67,9 @@ impl Finder {
         site: Option<&Site<D>>,
         width: Width,
     ) -> Result<Self, RunError> {
-        let kernels = plan.kernels.clone().ok_or_else(|| unsound("no kernels"))?;
+        let mut kernels = plan.kernels.clone().ok_or_else(|| unsound("no kernels"))?;
+        // Nothing reacts by them; those that average are best for the second order.
+        kernels.narrowing = if kernels.order == FOURTH { 1.0 / WIDER } else { 1.0 };
         let axis = |(idx, (axis, &n)): (usize, (&Axis, &usize))| {
             let is_ring = axis.low_side == Side::Periodic;
             let usual = [if is_ring { End::Wrap } else { End::Mirror }; 2];

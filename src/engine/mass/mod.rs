@@ -7,7 +7,7 @@ mod births;
 pub(super) mod book;
 mod courant;
 mod entry;
-mod fields;
+pub(super) mod fields;
 pub(super) mod flock;
 pub(super) mod gate;
 mod in_time;

@@ -1,9 +1,11 @@
 //! Densities of what parcels carry, by kernels.
 //!
-//! Owns points with a mass each in place of parcels of water. May use the kernels of masses and the plan. It deliberately
-//! weighs no parcel by those around it: where they lie shows, as it does with particles that carry mass.
+//! Owns points with a mass each in place of parcels of water. May use the kernels of masses and the plan. It deliberately keeps
+//! nothing beyond a time.
 
+use super::super::density::{Lattice, Tally};
 use super::super::error::RunError;
+use super::super::mass::fields::Binned;
 use super::super::mass::kernels::{Finder, Found};
 use super::super::mass::world::Site;
 use super::super::program::unsound;
@@ -18,14 +20,15 @@ pub struct ByKernels<'a, const D: usize> {
     run: &'a Run<'a, D>,
     finder: Finder,
     grid: Grid<D>,
-    /// Water per volume, by cell.
-    water: Vec<f64>,
+    low: Vec<f64>,
+    /// Numbers of parcels by cell.
+    parcels: Option<Tally>,
     found: Vec<(usize, Found)>,
 }
 
 impl<'a, const D: usize> ByKernels<'a, D> {
     pub fn new(run: &'a Run<'a, D>, t: f64) -> Result<Self, RunError> {
-        let (program, plan) = (&run.program, run.program.plan);
+        let plan = run.program.plan;
         let site = run.water.as_ref().map(|water| Site::<D>::new(plan, water.flow())).transpose()?;
         let flows = site.as_ref().map(|site| site.transport.flows());
         let velocity = |place: [f64; D]| match (&site, &flows) {
@@ -34,18 +37,13 @@ impl<'a, const D: usize> ByKernels<'a, D> {
         };
         let finder = Finder::of_water(plan, site.as_ref(), run.width)?.asked(velocity);
         let grid = finder.grid().ok_or_else(|| unsound("cells of kernels that are none"))?;
-        let extent: f64 = plan.axes.iter().map(|axis| axis.high - axis.low).product();
-        let even = program.volume * plan.particles.count as f64 / extent;
-        let water = match &site {
-            Some(site) => site.porosity_of_bins(&grid),
-            None => vec![even; grid.n_bins()],
-        };
-        Ok(Self { run, finder, grid, water, found: Vec::new() })
+        let low = plan.axes.iter().map(|axis| axis.low).collect();
+        Ok(Self { run, finder, grid, low, parcels: None, found: Vec::new() })
     }
 
     /// Values of an output from positions, and the concentrations of its species.
     ///
-    /// - Equation: kernels of points with masses `m_i = c_i V`.
+    /// - Equation: density by kernels of points with masses `m_i = c_i V`; concentration over what the same kernels find of water.
     /// - Symbols: `c_i` concentration of a parcel, `V` its water.
     /// - Range: concentrations that are not negative; beyond open sides there are no cells.
     /// - Source: methods, section 4.6, weights.
@@ -55,13 +53,14 @@ impl<'a, const D: usize> ByKernels<'a, D> {
             return Err(unsound("a density without particles"));
         };
         let positions: Vec<&[f64]> = positions.iter().map(|axis| &axis[..]).collect();
+        let lattice = &self.finder.lattice;
+        let parcels = self.parcels.get_or_insert_with(|| Tally::of(lattice, &self.low, &positions, None));
+        let (plan, volume) = (self.run.program.plan, self.run.program.volume);
         let mut all = Vec::new();
         for (species, concentrations) in tally::species(output).into_iter().zip(concentrations) {
-            let known = self.found.iter().position(|(own, _)| *own == species);
-            let idx = match known {
+            let idx = match self.found.iter().position(|(own, _)| *own == species) {
                 Some(idx) => idx,
                 None => {
-                    let volume = self.run.program.volume;
                     let masses: Vec<f64> = concentrations.iter().map(|c| c * volume).collect();
                     self.found.push((species, self.finder.find_at(&positions, &masses, None)?));
                     self.found.len() - 1
@@ -70,9 +69,39 @@ impl<'a, const D: usize> ByKernels<'a, D> {
             let found = &self.found[idx].1;
             all.push(match output.kind {
                 OutputKind::Kernels => vec![Found::size_row(Some(found))],
-                _ => found.rows(&self.run.program.plan.axes, &self.grid, &self.water),
+                _ => found.rows(&plan.axes, &self.grid, &per_water(lattice, found, parcels, volume)),
             });
         }
         Ok(Values::Rows(all))
     }
+}
+
+/// Concentrations in cells, and their standard errors.
+///
+/// - Equation: `ĉ = F[m]/F[v]`, `s² = (Q[m²] − 2 ĉ Q[m v] + ĉ² Q[v²])/F[v]²`.
+/// - Symbols: `F` sums over parcels with the kernel of the cell that is looked at, `Q` with squared ones; `m` mass and `v` water.
+/// - Range: where there is water within a kernel; where parcels lie does not show, only how much they differ.
+/// - Source: E. A. Nadaraya 1964, On estimating regression, Theory Probab. Appl. 9, 141; linearised errors of a ratio.
+/// - Shape: one value per cell of the lattice.
+fn per_water(lattice: &Lattice, found: &Found, parcels: &Tally, volume: f64) -> Binned {
+    let (kernels, tally) = (&found.projection, &found.tally);
+    let n = lattice.n_cells();
+    let all: Vec<u32> = (0..n as u32).collect();
+    let sums = |cells: &[u32], values: &[f64], scale: f64| -> Vec<f64> {
+        let mut field = vec![0.0; n];
+        cells.iter().zip(values).for_each(|(&cell, value)| field[cell as usize] = scale * value);
+        kernels.gather(&all, field)
+    };
+    let mass = sums(&tally.cells, &tally.masses, 1.0);
+    let numbers = sums(&parcels.cells, &parcels.counts, 1.0);
+    let squares = sums(&tally.cells, &tally.squares, tally.largest * tally.largest);
+    let (mut mean, mut standard_error) = (vec![0.0; n], vec![0.0; n]);
+    for cell in (0..n).filter(|&cell| numbers[cell] > 0.0) {
+        let water = volume * numbers[cell];
+        let c = mass[cell] / water;
+        let square = squares[cell] - 2.0 * c * volume * mass[cell] + c * c * volume * water;
+        mean[cell] = c;
+        standard_error[cell] = (kernels.squared(cell) * square.max(0.0)).sqrt() / water;
+    }
+    Binned { mean, standard_error }
 }

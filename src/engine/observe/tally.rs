@@ -51,8 +51,7 @@ pub enum Tally<'a, const D: usize> {
         bins: Bins<D>,
         species: Vec<usize>,
     },
-    /// Collected apart, as nothing is summed.
-    /// What is seen of them is listed, particle by particle.
+    /// Collected apart, particle by particle, as nothing is summed.
     Particles {
         species: Vec<usize>,
     },

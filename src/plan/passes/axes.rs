@@ -46,7 +46,6 @@ fn reads(operations: &[Operation], input: u16) -> bool {
 fn shows(output: &Output, axis_idx: usize) -> bool {
     match output.kind {
         OutputKind::Map | OutputKind::Particles | OutputKind::Moments | OutputKind::Dilution => true,
-        // These need particles that carry mass, whose axes stay.
         OutputKind::Breakthrough | OutputKind::FirstPassage | OutputKind::Budget => true,
         OutputKind::Density | OutputKind::Kernels => true,
         OutputKind::Profile | OutputKind::Covariance => output.bins[axis_idx] > 1,

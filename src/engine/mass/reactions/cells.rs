@@ -72,12 +72,8 @@ impl Vessel {
         (step, t, dt): (u64, f64, f64),
     ) -> Result<(), RunError> {
         debug_assert_eq!(content.columns.len(), self.n_species);
-        let noise = self.noise.as_ref().filter(|_| !content.variances.is_empty());
-        let factors = noise.map(|noise| {
-            let factors =
-                noise.factors((&content.places, t + 0.5 * dt), &content.columns, &content.variances);
-            (noise, factors, content.columns.clone())
-        });
+        let is_noisy = self.noise.is_some() && !content.variances.is_empty();
+        let before = if is_noisy { content.columns.clone() } else { Vec::new() };
         if let Some(reactor) = &self.reactor {
             let mut chunks = chunks(content, &self.species, &self.memory);
             let scratches: Pool<Scratch> = Pool::new();
@@ -98,8 +94,9 @@ impl Vessel {
                 return Err(refuse(plan, content, (step, idx * CHUNK + failure.particle), failure));
             }
         }
-        if let Some((noise, factors, before)) = &factors {
-            noise.correct(&mut content.columns, before, factors);
+        if let Some(noise) = self.noise.as_ref().filter(|_| is_noisy) {
+            let at = (&content.places, t + 0.5 * dt, dt);
+            noise.correct(at, &mut content.columns, &before, &content.variances);
         }
         for reaction in &self.instant {
             complete(reaction, &mut content.columns);

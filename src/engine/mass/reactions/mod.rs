@@ -380,15 +380,19 @@ fn makers<const D: usize>(site: &Site<D>, releases: &mut Vec<Release<D>>) -> Vec
     let (mass, n) = numbers.fold((0.0, 0.0), |(mass, n), own| (mass + own.0, n + own.1));
     let usual = if n > 0.0 { mass / n } else { 0.0 };
     for (population, own) in site.transport.populations.iter().enumerate() {
-        let of_others = releases.iter().filter(|release| release.population == population);
-        let of_others = of_others.map(|release| release.unit).fold(0.0, f64::max);
+        let of_own = || releases.iter().filter(|release| release.population == population);
+        let own_mass: f64 = of_own().map(|release| release.unit * release.expected()).sum();
+        let of_others = of_own().map(|release| release.unit).fold(0.0, f64::max);
         let known = own.made.map_or(of_others, |made| made.max(of_others));
         let unit = if known > 0.0 { known } else { usual };
         let origin = releases.len();
         let (from, to) = (f64::INFINITY, f64::INFINITY);
         let kind = Kind::Steady { n: 0, from, to, sampling: Sampling::Random };
         releases.push(Release { door: 0, origin, population, unit, place: Place::Point(site.low), kind });
-        makers.push(Maker { population, origin, unit, count: own.count as f64, n_made: 0, pending: 0.0 });
+        // Where all species share one number, its own says how much of it there is at first, and not how much can be made.
+        let is_of_all = own.made.is_some() && unit * (own.count as f64 - 1.5) <= own_mass;
+        let count = (own.count as f64).max(if is_of_all { mass / unit } else { 0.0 });
+        makers.push(Maker { population, origin, unit, count, n_made: 0, pending: 0.0 });
     }
     makers
 }

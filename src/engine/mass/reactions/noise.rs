@@ -5,11 +5,14 @@
 
 #![allow(clippy::needless_range_loop)] // A cell belongs to several columns at once.
 
+use super::super::super::parallel;
 use crate::plan::Plan;
 use crate::plan::build_tape::SPECIES_INPUT;
 use crate::plan::chemistry::{Kinetic, Kinetics, Law};
-use crate::plan::tape::Tape;
+use crate::plan::tape::{Operation, Tape};
+use crate::state::particles::CHUNK;
 use nalgebra::DMatrix;
+use std::ops::Range;
 
 /// Laws of a plan, at least one of them bent.
 #[derive(Debug, Clone)]
@@ -30,13 +33,15 @@ struct Change {
     tapes: Vec<(f64, Tape)>,
     /// Species that they are bent in, or may be.
     species: Vec<usize>,
+    /// It comes to rest between two ways, where the sum of rates says nothing of what noise does to either.
+    has_both_ways: bool,
 }
 
 /// Of the largest singular value, what is as good as none.
 const NONE: f64 = 1e-9;
 
-/// Factors beyond which noise is no small thing that could be corrected.
-const FACTORS: (f64, f64) = (0.0, 2.0);
+/// Part of a rate beyond which noise is no small thing that could be corrected.
+const MOST: f64 = 1.0;
 
 impl Noise {
     /// Of a plan whose reactions are all at rates, some not linear in each species, and show in what changes.
@@ -55,6 +60,7 @@ impl Noise {
         for (idx, reaction) in kinetics.reactions.iter().enumerate() {
             add(plan, kinetics, (idx, reaction), &mut changes)?;
         }
+        changes.iter_mut().filter(|change| change.has_both_ways).for_each(|change| change.species.clear());
         if changes.iter().all(|change| change.species.is_empty()) {
             return None;
         }
@@ -71,32 +77,27 @@ impl Noise {
         Some(Self { changes, shares: plan.species.iter().map(share).collect() })
     }
 
-    /// What a rate of estimated concentrations has to be multiplied by to be that of the true ones on average.
+    /// By how much of itself a rate of estimated concentrations has to be changed to be that of the true ones on average.
     ///
-    /// - Equation: `f = 1 − Σ_s [r(c + σ_s) − 2 r(c) + r(c − σ_s)]/(2 r(c))`.
+    /// - Equation: `b = −Σ_s [r(c + σ_s) − 2 r(c) + r(c − σ_s)]/(2 r(c))`.
     /// - Symbols: `σ_s` standard error of a concentration, at most the concentration; `r` rate.
-    /// - Range: 0 to 2; exact for quadratic laws with errors of the species that are independent. Rates of one change are added.
+    /// - Range: -1 to 1; exact for quadratic laws with errors of the species that are independent. Rates of one change are added.
     /// - Source: methods, section 5.3, noise bias `½ r″ Var`, with differences over a standard error for derivatives.
-    /// - Shape: one per change and cell; none for changes whose laws are not bent.
-    pub fn factors(
-        &self,
-        at: (&[Vec<f64>; 3], f64),
-        columns: &[Vec<f64>],
-        variances: &[Vec<f64>],
-    ) -> Vec<Vec<f64>> {
-        let scaled = |(own, share): (&Vec<f64>, &f64)| own.iter().map(|u| u * share).collect();
+    /// - Shape: with the rate, one per change and cell; none for changes whose laws are not bent.
+    fn bends(&self, at: ([&[f64]; 3], f64), columns: &[&[f64]], variances: &[&[f64]]) -> Vec<Vec<[f64; 2]>> {
+        let scaled = |(own, share): (&&[f64], &f64)| own.iter().map(|u| u * share).collect();
         let columns: Vec<Vec<f64>> = columns.iter().zip(&self.shares).map(scaled).collect();
-        let of = |change: &Change| self.factors_of(change, at, &columns, variances);
+        let of = |change: &Change| self.bends_of(change, at, &columns, variances);
         self.changes.iter().map(of).collect()
     }
 
-    fn factors_of(
+    fn bends_of(
         &self,
         change: &Change,
-        (places, t): (&[Vec<f64>; 3], f64),
+        (places, t): ([&[f64]; 3], f64),
         columns: &[Vec<f64>],
-        variances: &[Vec<f64>],
-    ) -> Vec<f64> {
+        variances: &[&[f64]],
+    ) -> Vec<[f64; 2]> {
         if change.species.is_empty() {
             return Vec::new();
         }
@@ -104,8 +105,7 @@ impl Noise {
         let (zeros, times) = (vec![0.0; n], vec![t; n]);
         let mut scratch = Vec::new();
         let mut rate = |moved: Option<(usize, &[f64])>| {
-            let along =
-                |axis: &'_ usize| if places[*axis].is_empty() { &zeros[..] } else { &places[*axis][..] };
+            let along = |axis: &'_ usize| if places[*axis].is_empty() { &zeros[..] } else { places[*axis] };
             let mut inputs: Vec<&[f64]> = [0, 1, 2].iter().map(along).collect();
             inputs.push(&times);
             debug_assert_eq!(inputs.len(), usize::from(SPECIES_INPUT));
@@ -121,48 +121,83 @@ impl Noise {
             rates
         };
         let middle = rate(None);
-        let mut factors = vec![1.0; n];
+        let mut bends = vec![0.0; n];
         for &species in change.species.iter().filter(|&&species| !variances[species].is_empty()) {
-            let (own, variance) = (&columns[species], &variances[species]);
+            let (own, variance) = (&columns[species], variances[species]);
             let moved = |sign: f64| -> Vec<f64> {
                 let share = self.shares[species];
                 own.iter().zip(variance).map(|(c, var)| c + sign * (share * var.sqrt()).min(*c)).collect()
             };
             let (above, below) = (rate(Some((species, &moved(1.0)))), rate(Some((species, &moved(-1.0)))));
-            for ((factor, middle), (above, below)) in
-                factors.iter_mut().zip(&middle).zip(above.iter().zip(&below))
+            for ((bend, middle), (above, below)) in
+                bends.iter_mut().zip(&middle).zip(above.iter().zip(&below))
             {
                 let bent = 0.5 * (above - 2.0 * middle + below) / middle;
                 if bent.is_finite() {
-                    *factor -= bent;
+                    *bend -= bent;
                 }
             }
         }
-        factors.iter_mut().for_each(|factor| *factor = factor.clamp(FACTORS.0, FACTORS.1));
-        factors
+        bends.iter().zip(middle).map(|(bend, rate)| [bend.clamp(-MOST, MOST), rate]).collect()
     }
 
-    /// Multiplies what each change has done, as far as there is enough of everything for it.
-    pub fn correct(&self, columns: &mut [Vec<f64>], before: &[Vec<f64>], factors: &[Vec<f64>]) {
+    /// Multiplies what each change has done since `before`, as far as there is enough of everything for it.
+    pub fn correct(
+        &self,
+        (places, t, dt): (&[Vec<f64>; 3], f64, f64),
+        columns: &mut [Vec<f64>],
+        before: &[Vec<f64>],
+        variances: &[Vec<f64>],
+    ) {
         let n = columns.first().map_or(0, Vec::len);
-        let mut more = vec![0.0; columns.len()];
-        for cell in 0..n {
-            more.fill(0.0);
-            for (change, factors) in self.changes.iter().zip(factors).filter(|(_, own)| !own.is_empty()) {
-                let extents = change.extent.iter().zip(columns.iter().zip(before));
-                let extent: f64 = extents.map(|(part, (new, old))| part * (new[cell] - old[cell])).sum();
-                let extent = (factors[cell] - 1.0) * extent;
-                more.iter_mut().zip(&change.net).for_each(|(more, net)| *more += net * extent);
-            }
-            let mut part = 1.0_f64;
-            for (new, more) in columns.iter().zip(&more).filter(|(_, more)| **more < 0.0) {
-                part = part.min(new[cell] / -more);
-            }
-            // What does not change keeps its last digit.
-            for (new, more) in columns.iter_mut().zip(&more).filter(|(_, more)| **more != 0.0) {
-                new[cell] = (new[cell] + part * more).max(0.0);
+        let all = parallel::map(n.div_ceil(CHUNK), &|chunk| {
+            let range = chunk * CHUNK..n.min((chunk + 1) * CHUNK);
+            let places = places.each_ref().map(|axis| axis.get(range.clone()).unwrap_or_default());
+            let (new, old) = (cut(columns, &range), cut(before, &range));
+            self.more((&new, &old), &self.bends((places, t), &old, &cut(variances, &range)), dt)
+        });
+        for (chunk, more) in all.iter().enumerate() {
+            for (column, more) in columns.iter_mut().zip(more) {
+                // What does not change keeps its last digit.
+                for (new, more) in column[chunk * CHUNK..].iter_mut().zip(more).filter(|it| *it.1 != 0.0) {
+                    *new = (*new + more).max(0.0);
+                }
             }
         }
+    }
+
+    /// What is to be added to each species.
+    ///
+    /// - Equation: `Σ_k ν_k b_k ξ_k (ξ_k/(r_k Δt))²`.
+    /// - Symbols: `b_k` bend of a rate, `ξ_k` extent of the step, `ν_k` what one extent changes.
+    /// - Range: steps of any length: what has run out does not hang on rates any more.
+    /// - Source: second derivative of `c₀ − c₀/(1 + k c₀ Δt)` by c₀, exact for A² alone.
+    /// - Shape: one per species and cell.
+    fn more(&self, (new, old): (&[&[f64]], &[&[f64]]), bends: &[Vec<[f64; 2]>], dt: f64) -> Vec<Vec<f64>> {
+        let n = new.first().map_or(0, |own| own.len());
+        let mut all = vec![vec![0.0; n]; new.len()];
+        for cell in 0..n {
+            for (change, bends) in self.changes.iter().zip(bends).filter(|(_, own)| !own.is_empty()) {
+                let mut extent = 0.0;
+                for species in 0..new.len() {
+                    extent += change.extent[species] * (new[species][cell] - old[species][cell]);
+                }
+                let [bend, rate] = bends[cell];
+                let followed = extent / (rate * dt);
+                let followed = if followed > 0.0 { followed.min(1.0) } else { 0.0 };
+                for species in 0..new.len() {
+                    all[species][cell] += change.net[species] * bend * followed * followed * extent;
+                }
+            }
+            let mut part = 1.0_f64;
+            for species in 0..new.len() {
+                if all[species][cell] < 0.0 {
+                    part = part.min(new[species][cell] / -all[species][cell]);
+                }
+            }
+            all.iter_mut().for_each(|own| own[cell] *= part);
+        }
+        all
     }
 }
 
@@ -180,24 +215,36 @@ fn add(
     if net.iter().all(|change| *change == 0.0) {
         return Some(());
     }
+    let tape = kinetics.laws.tape(idx);
     let species: Vec<usize> = match &reaction.law {
         Law::MassAction { orders, .. } => {
             orders.iter().filter(|(_, order)| *order != 1.0).map(|(species, _)| *species).collect()
         }
         Law::Saturation { species, .. } => vec![*species],
-        Law::Expression => (0..plan.species.len()).collect(),
+        Law::Expression => (0..plan.species.len()).filter(|&species| reads(&tape, species)).collect(),
     };
-    let tape = kinetics.laws.tape(idx);
     for change in changes.iter_mut() {
         let Some(weight) = ratio(&net, &change.net) else { continue };
         change.tapes.push((weight, tape));
         change.species.extend(species);
         change.species.sort_unstable();
         change.species.dedup();
+        change.has_both_ways |= weight < 0.0;
         return Some(());
     }
-    changes.push(Change { net, extent: Vec::new(), tapes: vec![(1.0, tape)], species });
+    let tapes = vec![(1.0, tape)];
+    changes.push(Change { net, extent: Vec::new(), tapes, species, has_both_ways: false });
     Some(())
+}
+
+/// Some cells of all columns that there are.
+fn cut<'a>(all: &'a [Vec<f64>], range: &Range<usize>) -> Vec<&'a [f64]> {
+    all.iter().map(|own| own.get(range.clone()).unwrap_or_default()).collect()
+}
+
+fn reads(tape: &Tape, species: usize) -> bool {
+    let input = SPECIES_INPUT + species as u16;
+    tape.operations.contains(&Operation::Input(input))
 }
 
 /// How many times a change is another one, if it is.
@@ -231,27 +278,28 @@ mod tests {
             noise("reaction one: A -> B @ 1 m^3/mol/s * A^2\nreaction two: B -> C @ 1 /s * B\n").unwrap();
         let before = [vec![2.0], vec![1.0], vec![0.0]];
         let places = [vec![0.5], Vec::new(), Vec::new()];
-        let factors = own.factors((&places, 0.0), &before, &[vec![0.4], vec![0.1], Vec::new()]);
-        assert!((factors[0][0] - 0.9).abs() < 1e-14 && factors[1].is_empty(), "{factors:?}");
-        // Extents of 0.1 and 0.05.
+        // Extents of 0.1, as fast as its rate says, and 0.05.
         let mut after = [vec![1.9], vec![1.05], vec![0.05]];
-        own.correct(&mut after, &before, &factors);
+        own.correct((&places, 0.0, 0.1 / 4.0), &mut after, &before, &[vec![0.4], vec![0.1], Vec::new()]);
         let right = [1.91, 1.04, 0.05];
         assert!(after.iter().zip(right).all(|(own, right)| (own[0] - right).abs() < 1e-14), "{after:?}");
+        // Four times the time: it has run out of what it is made of.
+        let mut after = [vec![1.9], vec![1.05], vec![0.05]];
+        own.correct((&places, 0.0, 0.1), &mut after, &before, &[vec![0.4], vec![0.1], Vec::new()]);
+        assert!((after[0][0] - 1.9 - 0.01 / 16.0).abs() < 1e-14, "{after:?}");
     }
 
-    /// Both ways of a reversible reaction are one change, whose law is their difference.
+    /// Both ways of a reversible reaction are one change, which is left alone, and one way in two parts is one law.
     #[test]
     fn both_ways_are_one() {
-        let own =
-            noise("reaction there: A -> B @ 1 m^3/mol/s * A^2\nreaction back: 2 B -> 2 A @ 0.1 /s * B\n");
-        let own = own.unwrap();
+        let (there, back) =
+            ("reaction there: A -> B @ 1 m^3/mol/s * A^2\n", "reaction back: 2 B -> 2 A @ 0.1 /s * B\n");
+        assert!(noise(&format!("{there}{back}")).is_none());
+        let own = noise(&format!("{there}reaction other: 2 A -> 2 B @ 0.1 /s * A\n")).unwrap();
         assert_eq!(own.changes.len(), 1);
-        let before = [vec![2.0], vec![1.0], vec![0.0]];
-        let places = [vec![0.5], Vec::new(), Vec::new()];
-        let factors = own.factors((&places, 0.0), &before, &[vec![0.4], Vec::new(), Vec::new()]);
-        // r = A² − 2 · 0.1 B.
-        assert!((factors[0][0] - (1.0 - 0.4 / 3.8)).abs() < 1e-14, "{factors:?}");
+        let bends = own.bends(([&[0.5], &[], &[]], 0.0), &[&[2.0], &[1.0], &[0.0]], &[&[0.4], &[], &[]]);
+        // r = A² + 2 · 0.1 A.
+        assert!((bends[0][0][0] + 0.4 / 4.4).abs() < 1e-14, "{bends:?}");
     }
 
     /// Round a ring extents do not show in what has changed.
