@@ -141,12 +141,19 @@ impl<'a> Checker<'a> {
         let Some(&output) = places.candidates().first() else {
             if results.are_whole {
                 let words: Vec<&str> = path.iter().map(|name| name.value.as_str()).collect();
+                let (kind_word, names) = (kind.word(), words[1..].join(", "));
+                let help = match kind.is_binned() || kind.is_course() {
+                    true => format!("add an `output {kind_word} {names}` statement"),
+                    false => format!(
+                        "`{kind_word}` has many rows at a time, which no measure reads: use `profile`, `map` or `total`"
+                    ),
+                };
                 self.report(
                     Diagnostic::error(M015, "no output of the scene gives this")
                         .at(span, "not an output")
                         .found(format!("`{}`", words.join(".")))
                         .expected("KIND.SPECIES of an `output` statement, such as `profile.A`")
-                        .help(format!("add an `output {} {}` statement", kind.word(), words[1..].join(", "))),
+                        .help(help),
                 );
             }
             return None;
