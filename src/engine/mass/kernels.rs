@@ -177,6 +177,11 @@ impl Finder {
         self.find_at(&positions.each_ref().map(|axis| &axis[..]), &masses, start)
     }
 
+    /// Points in cells, with a mass each or one for all.
+    pub fn tally(&self, positions: &[&[f64]], masses: Option<&[f64]>) -> Tally {
+        Tally::of(&self.lattice, &self.low, positions, masses)
+    }
+
     /// Kernels of points with a mass each.
     pub fn find_at(
         &self,
@@ -184,7 +189,7 @@ impl Finder {
         masses: &[f64],
         start: Option<f64>,
     ) -> Result<Found, RunError> {
-        let tally = Tally::of(&self.lattice, &self.low, positions, Some(masses));
+        let tally = self.tally(positions, Some(masses));
         match self.kernels.manner {
             Manner::Adaptive => Ok(self.adaptive(tally, start)),
             Manner::Global | Manner::Fixed => self.one(tally),

@@ -20,7 +20,6 @@ pub struct ByKernels<'a, const D: usize> {
     run: &'a Run<'a, D>,
     finder: Finder,
     grid: Grid<D>,
-    low: Vec<f64>,
     /// Numbers of parcels by cell.
     parcels: Option<Tally>,
     found: Vec<(usize, Found)>,
@@ -37,8 +36,7 @@ impl<'a, const D: usize> ByKernels<'a, D> {
         };
         let finder = Finder::of_water(plan, site.as_ref(), run.width)?.asked(velocity);
         let grid = finder.grid().ok_or_else(|| unsound("cells of kernels that are none"))?;
-        let low = plan.axes.iter().map(|axis| axis.low).collect();
-        Ok(Self { run, finder, grid, low, parcels: None, found: Vec::new() })
+        Ok(Self { run, finder, grid, parcels: None, found: Vec::new() })
     }
 
     /// Values of an output from positions, and the concentrations of its species.
@@ -53,8 +51,8 @@ impl<'a, const D: usize> ByKernels<'a, D> {
             return Err(unsound("a density without particles"));
         };
         let positions: Vec<&[f64]> = positions.iter().map(|axis| &axis[..]).collect();
-        let lattice = &self.finder.lattice;
-        let parcels = self.parcels.get_or_insert_with(|| Tally::of(lattice, &self.low, &positions, None));
+        let finder = &self.finder;
+        let parcels = self.parcels.get_or_insert_with(|| finder.tally(&positions, None));
         let (plan, volume) = (self.run.program.plan, self.run.program.volume);
         let mut all = Vec::new();
         for (species, concentrations) in tally::species(output).into_iter().zip(concentrations) {
@@ -62,14 +60,14 @@ impl<'a, const D: usize> ByKernels<'a, D> {
                 Some(idx) => idx,
                 None => {
                     let masses: Vec<f64> = concentrations.iter().map(|c| c * volume).collect();
-                    self.found.push((species, self.finder.find_at(&positions, &masses, None)?));
+                    self.found.push((species, finder.find_at(&positions, &masses, None)?));
                     self.found.len() - 1
                 }
             };
             let found = &self.found[idx].1;
             all.push(match output.kind {
                 OutputKind::Kernels => vec![Found::size_row(Some(found))],
-                _ => found.rows(&plan.axes, &self.grid, &per_water(lattice, found, parcels, volume)),
+                _ => found.rows(&plan.axes, &self.grid, &per_water(&finder.lattice, found, parcels, volume)),
             });
         }
         Ok(Values::Rows(all))

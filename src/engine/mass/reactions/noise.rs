@@ -61,7 +61,8 @@ impl Noise {
             add(plan, kinetics, (idx, reaction), &mut changes)?;
         }
         changes.iter_mut().filter(|change| change.has_both_ways).for_each(|change| change.species.clear());
-        if changes.iter().all(|change| change.species.is_empty()) {
+        let is_straight = changes.iter().all(|change| change.species.is_empty());
+        if is_straight || changes.len() > plan.species.len() {
             return None;
         }
         let net = DMatrix::from_fn(plan.species.len(), changes.len(), |row, column| changes[column].net[row]);
@@ -308,6 +309,9 @@ mod tests {
         let ring = "reaction one: A -> B @ 1 m^3/mol/s * A^2\nreaction two: B -> C @ 1 m^3/mol/s * B^2\n\
                     reaction three: C -> A @ 1 m^3/mol/s * C^2\n";
         assert!(noise(ring).is_none());
+        let many = "reaction one: A -> B @ 1 m^3/mol/s * A^2\nreaction a: A -> @ 1 m^3/mol/s * A^2\n\
+                    reaction b: B -> @ 1 m^3/mol/s * B^2\nreaction c: C -> @ 1 m^3/mol/s * C^2\n";
+        assert!(noise(many).is_none());
         assert!(noise("reaction one: A + B -> C @ 1 m^3/mol/s * A * B\n").is_none());
     }
 }
