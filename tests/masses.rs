@@ -5,13 +5,31 @@
 #[path = "support/scene.rs"]
 mod scene;
 
-use lamella::plan::OutputKind;
+use lamella::engine::{Settings as EngineSettings, Starts, Unattended};
+use lamella::plan::{OutputKind, Plan};
 use lamella::scenario::Settings;
 use scene::{Finished, edited, run, run_with, tell};
 
 fn with(text: &str, set: &[(&str, &str)], seed: u64) -> Finished {
     let set = set.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect();
     run_with(text, &Settings { set, seed: Some(seed), ..Settings::default() })
+}
+
+fn plan_of(text: &str) -> Plan {
+    let sources = lamella::source::Sources::single("scene.lam", text);
+    let checked = lamella::check(sources, &Settings::default(), &Default::default());
+    checked.compiled.unwrap_or_else(|| panic!("{:#?}", checked.diagnostics)).plan
+}
+
+/// All snapshots, to the last digit.
+fn shown(plan: &Plan, settings: &EngineSettings) -> Vec<String> {
+    let mut found = Vec::new();
+    lamella::engine::run(plan, settings, &Unattended, &mut |snapshot| {
+        found.push(format!("{snapshot:?}"));
+        Ok(())
+    })
+    .expect("the plan runs");
+    found
 }
 
 /// Amounts at the last time, by species.
@@ -162,8 +180,6 @@ fn reactions_keep_their_proportions() {
 /// One plan and one seed are the same bits on any number of threads, with wide and narrow code.
 #[test]
 fn any_number_of_threads_gives_the_same_bits() {
-    use lamella::engine::{Settings as EngineSettings, Unattended};
-    use lamella::plan::compile::Options;
     let pairs = edited(
         NETWORK,
         "reaction one: A + 2 B -> 3 C @ 2 m^3/mol/d * A * B",
@@ -175,21 +191,10 @@ fn any_number_of_threads_gives_the_same_bits() {
         "gaussian adaptive { grid 0.25 m, reactions pairs }",
     );
     for text in [NETWORK, &pairs] {
-        let sources = lamella::source::Sources::single("scene.lam", text);
-        let checked = lamella::check(sources, &Settings::default(), &Options::default());
-        let plan = checked.compiled.unwrap_or_else(|| panic!("{:#?}", checked.diagnostics)).plan;
+        let plan = plan_of(text);
         let of = |n_threads: usize, is_narrow: bool| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(n_threads).build().unwrap();
-            let mut found = Vec::new();
-            let settings = EngineSettings { is_narrow, ..EngineSettings::default() };
-            pool.install(|| {
-                lamella::engine::run(&plan, &settings, &Unattended, &mut |snapshot| {
-                    found.push(format!("{snapshot:?}"));
-                    Ok(())
-                })
-            })
-            .unwrap();
-            found
+            pool.install(|| shown(&plan, &EngineSettings { is_narrow, ..EngineSettings::default() }))
         };
         let first = of(1, false);
         assert!(first == of(2, false) && first == of(3, true));
@@ -247,7 +252,6 @@ output total A at t = 2 s
 /// An integrated initial concentration of another run changes no byte, and one that differs in anything is another.
 #[test]
 fn runs_may_share_what_they_begin_with() {
-    use lamella::engine::{Settings as EngineSettings, Starts, Unattended};
     let scene = |centre: &str, porosity: &str| {
         format!(
             "lamella 1\nspecies A\ndomain line x = 0 m .. 10 m\nboundary left, right reflect\nmedium porosity {porosity}\n\
@@ -257,19 +261,9 @@ fn runs_may_share_what_they_begin_with() {
     };
     let starts = Starts::default();
     for (centre, porosity) in [("3 m", "0.3"), ("3 m", "0.4"), ("6 m", "0.3"), ("3 m", "0.3")] {
-        let sources = lamella::source::Sources::single("scene.lam", scene(centre, porosity));
-        let checked = lamella::check(sources, &Settings::default(), &Default::default());
-        let plan = checked.compiled.unwrap_or_else(|| panic!("{:#?}", checked.diagnostics)).plan;
-        let of = |starts: Option<Starts>| {
-            let mut found = Vec::new();
-            let settings = EngineSettings { starts, ..EngineSettings::default() };
-            lamella::engine::run(&plan, &settings, &Unattended, &mut |snapshot| {
-                found.push(format!("{snapshot:?}"));
-                Ok(())
-            })
-            .unwrap();
-            found
-        };
+        let plan = plan_of(&scene(centre, porosity));
+        let of =
+            |starts: Option<Starts>| shown(&plan, &EngineSettings { starts, ..EngineSettings::default() });
         assert!(of(Some(starts.clone())) == of(None), "{centre} {porosity}");
     }
 }

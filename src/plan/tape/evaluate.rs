@@ -39,13 +39,6 @@ impl Tape {
             let end = (start + LANE).min(out.len());
             for (idx, operation) in self.operations.iter().enumerate() {
                 let (written, rest) = scratch.split_at_mut(idx * LANE);
-                if let Operation::Constant(value) = operation {
-                    // It stays in its register.
-                    if start == 0 {
-                        rest[..LANE].fill(*value);
-                    }
-                    continue;
-                }
                 let target = &mut rest[..end - start];
                 width.run(Lane { operation, inputs, start, written, target });
             }
@@ -73,7 +66,9 @@ impl pulp::NullaryFnOnce for Lane<'_> {
         let n = target.len();
         let read = |register: u16| &written[usize::from(register) * LANE..][..n];
         match *operation {
-            Operation::Constant(value) => target.fill(value),
+            // It stays in its register, as no later lane is longer.
+            Operation::Constant(value) if start == 0 => target.fill(value),
+            Operation::Constant(_) => {}
             Operation::Input(input) => {
                 target.copy_from_slice(&inputs[usize::from(input)][start..start + n]);
             }

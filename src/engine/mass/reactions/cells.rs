@@ -64,16 +64,14 @@ impl Vessel {
         })
     }
 
-    /// Takes all cells over a time: rates first, then what is complete at once.
+    /// Takes all cells over a time from what there was before: rates first, then what is complete at once.
     pub fn react(
         &mut self,
         plan: &Plan,
-        content: &mut Content,
+        (content, before): (&mut Content, &[Vec<f64>]),
         (step, t, dt): (u64, f64, f64),
     ) -> Result<(), RunError> {
         debug_assert_eq!(content.columns.len(), self.n_species);
-        let is_noisy = self.noise.is_some() && !content.variances.is_empty();
-        let before = if is_noisy { content.columns.clone() } else { Vec::new() };
         if let Some(reactor) = &self.reactor {
             let mut chunks = chunks(content, &self.species, &self.memory);
             let scratches: Pool<Scratch> = Pool::new();
@@ -94,9 +92,9 @@ impl Vessel {
                 return Err(refuse(plan, content, (step, idx * CHUNK + failure.particle), failure));
             }
         }
-        if let Some(noise) = self.noise.as_ref().filter(|_| is_noisy) {
+        if let Some(noise) = self.noise.as_ref().filter(|_| !content.variances.is_empty()) {
             let at = (&content.places, t + 0.5 * dt, dt);
-            noise.correct(at, &mut content.columns, &before, &content.variances);
+            noise.correct(at, &mut content.columns, before, &content.variances);
         }
         for reaction in &self.instant {
             complete(reaction, &mut content.columns);

@@ -185,7 +185,7 @@ impl<const D: usize> Reactions<D> {
         let spread = self.spread(flocks, units, &census, when.step)?;
         let mut fields = Fields { content: self.content(&spread, &census), spread };
         let before = fields.content.columns.clone();
-        self.vessel.react(site.plan, &mut fields.content, (when.step + 1, t, dt))?;
+        self.vessel.react(site.plan, (&mut fields.content, &before), (when.step + 1, t, dt))?;
         for (idx, census) in census.iter().enumerate() {
             let changes = self.changes(idx, &fields, &before);
             let Some((loss, gains)) = changes else { continue };

@@ -33,8 +33,6 @@ struct Change {
     tapes: Vec<(f64, Tape)>,
     /// Species that they are bent in, or may be.
     species: Vec<usize>,
-    /// It comes to rest between two ways, where the sum of rates says nothing of what noise does to either.
-    has_both_ways: bool,
 }
 
 /// Of the largest singular value, what is as good as none.
@@ -60,7 +58,9 @@ impl Noise {
         for (idx, reaction) in kinetics.reactions.iter().enumerate() {
             add(plan, kinetics, (idx, reaction), &mut changes)?;
         }
-        changes.iter_mut().filter(|change| change.has_both_ways).for_each(|change| change.species.clear());
+        // What comes to rest between two ways is left alone: the sum of rates says nothing of what noise does to either.
+        let has_both_ways = |change: &&mut Change| change.tapes.iter().any(|(weight, _)| *weight < 0.0);
+        changes.iter_mut().filter(has_both_ways).for_each(|change| change.species.clear());
         let is_straight = changes.iter().all(|change| change.species.is_empty());
         if is_straight || changes.len() > plan.species.len() {
             return None;
@@ -230,11 +230,9 @@ fn add(
         change.species.extend(species);
         change.species.sort_unstable();
         change.species.dedup();
-        change.has_both_ways |= weight < 0.0;
         return Some(());
     }
-    let tapes = vec![(1.0, tape)];
-    changes.push(Change { net, extent: Vec::new(), tapes, species, has_both_ways: false });
+    changes.push(Change { net, extent: Vec::new(), tapes: vec![(1.0, tape)], species });
     Some(())
 }
 
